@@ -1,0 +1,3 @@
+//! The `voxlathe` command.
+
+fn main() {}
