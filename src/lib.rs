@@ -1,3 +1,6 @@
 //! Exact voxel grids and signed distances of solids of revolution given by NURBS profiles.
 
 pub mod grid;
+pub mod math;
+pub mod region;
+pub mod solid;

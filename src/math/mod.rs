@@ -1,1 +1,14 @@
-//! m
+//! Numbers only: no geometry type of a solid, no grid, no file.
+
+pub mod bernstein;
+pub mod dd;
+pub mod disc;
+pub mod quadrature;
+pub mod similarity;
+pub mod tolerance;
+
+mod aabb;
+
+pub use aabb::Aabb;
+pub use dd::{Dd, Real};
+pub use similarity::Similarity;

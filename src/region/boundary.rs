@@ -1,0 +1,317 @@
+//! The boundary of the filled region.
+//!
+//! A piece of a loop bounds the region where one of its sides is inside and the other is not.
+//! Pieces are cut where they meet others, so that each part has one state on each side; the state
+//! comes from counting crossings along a ray through the middle of the part. Parts with the same
+//! state on both sides, and all but one of coincident parts, are left out.
+
+use super::crossings::{CrossingSet, Winding};
+use super::piece::Piece;
+use super::tree::{Box2, BoxTree};
+use crate::math::{Dd, Real};
+
+/// A piece of a region's boundary.
+#[derive(Debug, Clone)]
+pub(crate) struct BoundaryPiece {
+    pub(crate) piece: Piece,
+    /// Whether the region lies on the left of the piece's own direction.
+    pub(crate) forward: bool,
+}
+
+impl BoundaryPiece {
+    /// +1 where the region lies at smaller r, -1 where it lies at larger r, 0 for a horizontal
+    /// piece: the sign of the piece's disc in the area of a cross-section.
+    pub(crate) fn disc_sign(&self) -> i32 {
+        if self.forward { self.piece.direction() } else { -self.piece.direction() }
+    }
+}
+
+/// The boundary and where loops cross.
+pub(crate) struct FilledBoundary {
+    pub(crate) pieces: Vec<BoundaryPiece>,
+    /// A place where two pieces cross, in the region's unit.
+    pub(crate) crossing: Option<[f64; 2]>,
+}
+
+/// Points nearer than this count as one, in the region's unit: some hundred roundings of f64.
+const COINCIDENT: f64 = 5e-14;
+
+/// The boundary of the set of points whose windings, one for each operand, `inside` accepts.
+/// `operand` tells which operand a piece belongs to.
+pub(crate) fn filled_boundary(pieces: &[Piece], inside: &dyn Fn(&[Winding]) -> bool, operand: &dyn Fn(usize) -> usize, operands: usize) -> FilledBoundary {
+    let meetings = meetings(pieces);
+    let mut parts = Vec::new();
+    let mut owner = Vec::new();
+    for (i, piece) in pieces.iter().enumerate() {
+        let before = parts.len();
+        cut_at(piece, &meetings.parameters[i], &mut parts);
+        owner.extend(std::iter::repeat_n(operand(i), parts.len() - before));
+    }
+    let set = CrossingSet::new(&parts);
+    let mut kept = Vec::new();
+    for (i, part) in parts.iter().enumerate() {
+        if let Some(forward) = side(&set, &parts, &owner, operands, i, inside) {
+            kept.push(BoundaryPiece { piece: part.clone(), forward });
+        }
+    }
+    FilledBoundary { pieces: kept, crossing: meetings.crossing }
+}
+
+/// `Some(forward)` where part `i` separates inside from outside.
+fn side(set: &CrossingSet, parts: &[Piece], owner: &[usize], operands: usize, i: usize, inside: &dyn Fn(&[Winding]) -> bool) -> Option<bool> {
+    let part = &parts[i];
+    let extent = [(part.end[0] - part.start[0]).f64(), (part.end[1] - part.start[1]).f64()];
+    // The ray runs across the part's longer extent.
+    let c = usize::from(extent[1].abs() >= extent[0].abs());
+    let middle = if part.degree() == 1 {
+        [0, 1].map(|k| (part.start[k] + part.end[k]) * Dd::of(0.5))
+    } else {
+        part.at(Dd::of(0.5))
+    };
+    let mut beyond = smallvec::SmallVec::<[Winding; 4]>::from_elem(Winding::default(), operands);
+    let mut before = beyond.clone();
+    let mut first = true;
+    let mut seen_self = false;
+    set.count_beyond(parts, c, middle[c], middle[1 - c], COINCIDENT, |k, coincident, direction| {
+        before[owner[k]].cross(direction);
+        if coincident {
+            first &= k >= i;
+            seen_self |= k == i;
+        } else {
+            beyond[owner[k]].cross(direction);
+        }
+    });
+    if !seen_self {
+        // A part so short that its own middle is at its end; it bounds nothing measurable.
+        return None;
+    }
+    let (inside_before, inside_beyond) = (inside(&before), inside(&beyond));
+    if !first || inside_before == inside_beyond {
+        return None;
+    }
+    // Travelling up, the left is at smaller r; travelling out, it is at larger z.
+    Some(if c == 1 { (extent[1] > 0.0) == inside_before } else { (extent[0] > 0.0) == inside_beyond })
+}
+
+/// The parts of a piece between the given parameters.
+fn cut_at(piece: &Piece, parameters: &[f64], parts: &mut Vec<Piece>) {
+    if parameters.is_empty() {
+        parts.push(piece.clone());
+        return;
+    }
+    let mut cuts: Vec<f64> = parameters.to_vec();
+    cuts.sort_by(f64::total_cmp);
+    cuts.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
+    let mut from = (Dd::ZERO, piece.start);
+    let ends = cuts.iter().map(|&t| {
+        let t = Dd::of(t);
+        let p = if piece.degree() == 1 {
+            [0, 1].map(|c| piece.start[c] + (piece.end[c] - piece.start[c]) * t)
+        } else {
+            piece.at(t)
+        };
+        (t, p)
+    });
+    for to in ends.chain([(Dd::ONE, piece.end)]) {
+        if from.1 != to.1 {
+            parts.push(if piece.degree() == 1 {
+                Piece::segment(from.1, to.1, piece.loop_index)
+            } else {
+                piece.part(from.0, to.0, from.1, to.1)
+            });
+            if let Some(part) = parts.last_mut() {
+                part.on_axis = piece.on_axis;
+            }
+        }
+        from = to;
+    }
+}
+
+struct Meetings {
+    /// For each piece, the parameters strictly inside it where it meets another.
+    parameters: Vec<Vec<f64>>,
+    crossing: Option<[f64; 2]>,
+}
+
+/// Where pieces meet other than at ends they share.
+fn meetings(pieces: &[Piece]) -> Meetings {
+    let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds.grown(COINCIDENT)).collect();
+    let tree = BoxTree::new(&boxes);
+    let mut found = Meetings { parameters: vec![Vec::new(); pieces.len()], crossing: None };
+    for (i, piece) in pieces.iter().enumerate() {
+        tree.visit(
+            |b| b.overlaps(&boxes[i]),
+            |j| {
+                let j = j as usize;
+                if j > i && boxes[j].overlaps(&boxes[i]) && !meet_only_in_corners(piece, &pieces[j]) {
+                    meet(piece, &pieces[j], i, j, &mut found);
+                }
+            },
+        );
+    }
+    found
+}
+
+/// Whether the boxes of two bi-monotone pieces touch in no more than a shared end.
+fn meet_only_in_corners(a: &Piece, b: &Piece) -> bool {
+    for p in [a.start, a.end] {
+        for q in [b.start, b.end] {
+            if p == q {
+                let (p, ab, bb) = (p.map(Real::f64), &a.bounds, &b.bounds);
+                // Opposite corners: the boxes lie on the two sides of the point in one coordinate
+                // and the coordinate is not constant for both.
+                let apart = |c: usize| (ab.max[c] <= p[c] && bb.min[c] >= p[c]) || (bb.max[c] <= p[c] && ab.min[c] >= p[c]);
+                let wide = |c: usize| ab.max[c] - ab.min[c] > 4.0 * COINCIDENT || bb.max[c] - bb.min[c] > 4.0 * COINCIDENT;
+                return apart(0) && wide(0) && apart(1) || apart(1) && wide(1) && apart(0);
+            }
+        }
+    }
+    false
+}
+
+/// A parameter interval with its end points, in absolute f64.
+#[derive(Clone, Copy)]
+struct Part {
+    t: [f64; 2],
+    p: [[f64; 2]; 2],
+}
+
+impl Part {
+    fn whole(piece: &Piece) -> Self {
+        Self { t: [0.0, 1.0], p: [piece.start.map(Real::f64), piece.end.map(Real::f64)] }
+    }
+    fn bounds(&self) -> Box2 {
+        Box2::around(self.p[0], self.p[1])
+    }
+    fn extent(&self) -> f64 {
+        (self.p[1][0] - self.p[0][0]).abs().max((self.p[1][1] - self.p[0][1]).abs())
+    }
+    fn halves(&self, piece: &Piece) -> [Self; 2] {
+        let m = 0.5 * (self.t[0] + self.t[1]);
+        let p = piece.twin.at(m);
+        let p = [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]];
+        [Self { t: [self.t[0], m], p: [self.p[0], p] }, Self { t: [m, self.t[1]], p: [p, self.p[1]] }]
+    }
+}
+
+fn meet(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
+    // Ends of one that lie on the other: these alone cut coincident stretches.
+    let mut contacts = 0;
+    for (x, y, k) in [(a, b, j), (b, a, i)] {
+        for end in [x.start, x.end] {
+            if let Some(t) = parameter_on(y, end) {
+                contacts += 1;
+                if t > 0.0 && t < 1.0 {
+                    found.parameters[k].push(t);
+                }
+            }
+        }
+    }
+    if contacts >= 2 && coincide(a, b) {
+        return;
+    }
+    if a.degree() == 1 && b.degree() == 1 {
+        if let Some((s, t)) = segments_cross(a, b) {
+            found.parameters[i].push(s);
+            found.parameters[j].push(t);
+            let p = [0, 1].map(|c| a.start[c].f64() + s * (a.end[c] - a.start[c]).f64());
+            found.crossing.get_or_insert(p);
+        }
+        return;
+    }
+    curves_cross(a, b, i, j, found);
+}
+
+/// The parameter of `p` on `piece`, where it lies on it: 0 or 1 at its ends.
+fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<f64> {
+    let close = |q: [Dd; 2]| (q[0] - p[0]).f64().abs() <= COINCIDENT && (q[1] - p[1]).f64().abs() <= COINCIDENT;
+    if close(piece.start) {
+        return Some(0.0);
+    }
+    if close(piece.end) {
+        return Some(1.0);
+    }
+    let extent = [(piece.end[0] - piece.start[0]).f64().abs(), (piece.end[1] - piece.start[1]).f64().abs()];
+    let c = usize::from(extent[1] >= extent[0]);
+    let (low, high) = if piece.start[c] <= piece.end[c] { (piece.start[c], piece.end[c]) } else { (piece.end[c], piece.start[c]) };
+    if !(p[c] > low && p[c] < high) {
+        return None;
+    }
+    // Along the longer extent the slope is at most about 1, so the offset is a distance.
+    let t = if piece.degree() == 1 { (p[c] - piece.start[c]) / (piece.end[c] - piece.start[c]) } else { piece.parameter_at(c, p[c]) };
+    ((piece.other_at(c, p[c]) - p[1 - c]).f64().abs() <= COINCIDENT).then(|| t.f64())
+}
+
+/// Whether the middle of what two pieces in contact at two points share is shared too.
+fn coincide(a: &Piece, b: &Piece) -> bool {
+    let (ab, bb) = (&a.bounds, &b.bounds);
+    let min = [0, 1].map(|c| ab.min[c].max(bb.min[c]));
+    let max = [0, 1].map(|c| ab.max[c].min(bb.max[c]));
+    let c = usize::from(max[1] - min[1] >= max[0] - min[0]);
+    if !(max[c] - min[c] > 4.0 * COINCIDENT) {
+        return true;
+    }
+    [0.31, 0.5, 0.73].iter().all(|s| {
+        let v = Dd::of(min[c] + s * (max[c] - min[c]));
+        (a.other_at(c, v) - b.other_at(c, v)).f64().abs() <= COINCIDENT
+    })
+}
+
+/// Parameters of a proper crossing of two segments.
+fn segments_cross(a: &Piece, b: &Piece) -> Option<(f64, f64)> {
+    let side = |p: &Piece, q: [Dd; 2]| {
+        let d = [p.end[0] - p.start[0], p.end[1] - p.start[1]];
+        ((q[1] - p.start[1]) * d[0] - (q[0] - p.start[0]) * d[1]).f64()
+    };
+    let (b0, b1) = (side(a, b.start), side(a, b.end));
+    let (a0, a1) = (side(b, a.start), side(b, a.end));
+    (a0 * a1 < 0.0 && b0 * b1 < 0.0).then(|| (a0 / (a0 - a1), b0 / (b0 - b1)))
+}
+
+/// Crossings of two pieces of which one is curved, by halving both.
+fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
+    const STEPS: usize = 20_000;
+    let mut work = vec![(Part::whole(a), Part::whole(b))];
+    let mut seen: Vec<[f64; 2]> = Vec::new();
+    for _ in 0..STEPS {
+        let Some((x, y)) = work.pop() else { return };
+        if !x.bounds().grown(1e-15).overlaps(&y.bounds()) {
+            continue;
+        }
+        let p = x.p[0];
+        if seen.iter().any(|q| (p[0] - q[0]).abs().max((p[1] - q[1]).abs()) <= 1e-10) {
+            continue;
+        }
+        if x.extent().max(y.extent()) <= 1e-14 {
+            seen.push(p);
+            let inner = |t: &[f64; 2]| t[0] > 1e-9 && t[1] < 1.0 - 1e-9;
+            if inner(&x.t) {
+                found.parameters[i].push(x.t[0]);
+            }
+            if inner(&y.t) {
+                found.parameters[j].push(y.t[0]);
+            }
+            if inner(&x.t) && inner(&y.t) && transversal(a, x.t[0], b, y.t[0]) {
+                found.crossing.get_or_insert(p);
+            }
+            continue;
+        }
+        // Halve the longer of the two.
+        if x.extent() >= y.extent() {
+            work.extend(x.halves(a).map(|h| (h, y)));
+        } else {
+            work.extend(y.halves(b).map(|h| (x, h)));
+        }
+    }
+}
+
+/// Whether two pieces that meet at interior parameters change sides there.
+fn transversal(a: &Piece, s: f64, b: &Piece, t: f64) -> bool {
+    let around = |piece: &Piece, t: f64| {
+        let h = 1e-5_f64.min(t).min(1.0 - t);
+        let (p, q) = (piece.twin.at(t - h), piece.twin.at(t + h));
+        [q[0] - p[0], q[1] - p[1]]
+    };
+    let (u, v) = (around(a, s), around(b, t));
+    (u[0] * v[1] - u[1] * v[0]).abs() > 1e-6 * u[0].hypot(u[1]) * v[0].hypot(v[1])
+}

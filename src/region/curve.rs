@@ -1,0 +1,373 @@
+//! Curves of a profile, and the rational Bézier pieces they are made of.
+//!
+//! Everything here is in double-double: the weight `cos(δ/2)` of an arc, the points of an
+//! interpolating curve or the control points of a knot span are irrational or rounded numbers in
+//! f64, and the solid is that of the numbers in the scene, not of their roundings.
+//!
+//! Source: Piegl & Tiller, *The NURBS Book*, 2nd ed.: blossoms and Bézier extraction §5.6, arcs
+//! §7.3, interpolation §9.2.1 (equations 9.5 and 9.8).
+
+use crate::math::{Dd, Real};
+
+/// A curve of the meridian half-plane, coordinates (r, z) in scene units.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ProfileCurve {
+    /// A NURBS curve on its domain `[u_d, u_{n+1}]`; knots clamped or not.
+    Nurbs {
+        /// Degree d.
+        degree: usize,
+        /// n + d + 2 knots, non-decreasing, interior multiplicity at most d.
+        knots: Vec<f64>,
+        /// n + 1 control points.
+        points: Vec<[f64; 2]>,
+        /// n + 1 positive weights.
+        weights: Vec<f64>,
+    },
+    /// Straight segments through the points.
+    Polyline {
+        /// At least two points.
+        points: Vec<[f64; 2]>,
+    },
+    /// An arc of an ellipse, from one angle to another; clockwise when `from > to`.
+    Arc {
+        /// Centre.
+        center: [f64; 2],
+        /// Half axes along r and z before the tilt; equal for a circle.
+        radii: [f64; 2],
+        /// Turn of the half axes, in degrees from +r towards +z.
+        tilt: f64,
+        /// Start angle in degrees.
+        from: f64,
+        /// End angle in degrees, at most a turn away.
+        to: f64,
+    },
+    /// The clamped curve through the points: chord-length parameters, knots by averaging.
+    Interpolate {
+        /// At least two points, no two consecutive ones equal.
+        points: Vec<[f64; 2]>,
+        /// Degree, reduced to the number of points less one where there are few.
+        degree: usize,
+    },
+    /// A curve run backwards.
+    Reversed(Box<ProfileCurve>),
+}
+
+/// A homogeneous point (w r, w z, w).
+pub(crate) type HomogeneousPoint = [Dd; 3];
+
+/// A rational Bézier piece of a curve.
+#[derive(Debug, Clone)]
+pub(crate) struct Bezier {
+    pub(crate) points: Vec<HomogeneousPoint>,
+    /// The part of the curve's own parameter it covers.
+    pub(crate) interval: [f64; 2],
+    /// Centre and radius, where the piece is part of a circle.
+    pub(crate) circle: Option<([Dd; 2], Dd)>,
+}
+
+impl Bezier {
+    fn segment(a: [Dd; 2], b: [Dd; 2], interval: [f64; 2]) -> Self {
+        let lift = |p: [Dd; 2]| [p[0], p[1], Dd::ONE];
+        Self { points: vec![lift(a), lift(b)], interval, circle: None }
+    }
+}
+
+fn exact(p: [f64; 2]) -> [Dd; 2] {
+    p.map(Dd::of)
+}
+
+/// The Bézier pieces of a curve, head to tail; neighbours share their end points to the last bit.
+pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
+    let mut pieces = match curve {
+        ProfileCurve::Nurbs { degree, knots, points, weights } => {
+            let knots: Vec<Dd> = knots.iter().copied().map(Dd::of).collect();
+            let points: Vec<HomogeneousPoint> = points
+                .iter()
+                .zip(weights)
+                .map(|(p, &w)| [Dd::product(p[0], w), Dd::product(p[1], w), Dd::of(w)])
+                .collect();
+            if *degree == 0 || points.len() <= *degree || knots.len() != points.len() + degree + 1 {
+                return Err(format!(
+                    "has degree {degree}, {} control points and {} knots; the counts must satisfy knots = control points + degree + 1",
+                    points.len(),
+                    knots.len()
+                ));
+            }
+            extract(*degree, &knots, &points)
+        }
+        ProfileCurve::Polyline { points } => {
+            if points.len() < 2 {
+                return Err(format!("has {} points; a polyline needs at least 2", points.len()));
+            }
+            #[allow(clippy::cast_precision_loss, reason = "a count")]
+            points
+                .windows(2)
+                .enumerate()
+                .map(|(i, w)| Bezier::segment(exact(w[0]), exact(w[1]), [i as f64, i as f64 + 1.0]))
+                .collect()
+        }
+        ProfileCurve::Arc { center, radii, tilt, from, to } => arc(*center, *radii, *tilt, *from, *to)?,
+        ProfileCurve::Interpolate { points, degree } => interpolate(points, *degree)?,
+        ProfileCurve::Reversed(inner) => {
+            let mut pieces = beziers(inner)?;
+            pieces.reverse();
+            for piece in &mut pieces {
+                piece.points.reverse();
+                piece.interval.reverse();
+            }
+            return Ok(pieces);
+        }
+    };
+    for i in 1..pieces.len() {
+        let joint = *pieces[i - 1].points.last().expect("a piece has points");
+        let next = &mut pieces[i].points[0];
+        // The two spans agree on their joint in exact arithmetic, up to a common factor.
+        let ratio = next[2] / joint[2];
+        *next = if ratio == Dd::ONE { joint } else { joint.map(|c| c * ratio) };
+    }
+    Ok(pieces)
+}
+
+/// Bézier pieces of the non-empty knot spans, each control point a blossom value.
+fn extract(degree: usize, knots: &[Dd], points: &[HomogeneousPoint]) -> Vec<Bezier> {
+    let mut pieces = Vec::new();
+    for span in degree..points.len() {
+        let (a, b) = (knots[span], knots[span + 1]);
+        if a >= b {
+            continue;
+        }
+        let local = &points[span - degree..=span];
+        let piece = (0..=degree).map(|j| blossom(degree, knots, span, local, a, b, j)).collect();
+        pieces.push(Bezier { points: piece, interval: [a.f64(), b.f64()], circle: None });
+    }
+    pieces
+}
+
+/// The blossom with `from_b` arguments equal to `b` and the rest equal to `a`.
+fn blossom(degree: usize, knots: &[Dd], span: usize, local: &[HomogeneousPoint], a: Dd, b: Dd, from_b: usize) -> HomogeneousPoint {
+    let mut work: Vec<HomogeneousPoint> = local.to_vec();
+    for r in 1..=degree {
+        let x = if r <= from_b { b } else { a };
+        for i in (r..=degree).rev() {
+            let (lo, hi) = (knots[span - degree + i], knots[span + i - r + 1]);
+            let alpha = (x - lo) / (hi - lo);
+            let beta = Dd::ONE - alpha;
+            for c in 0..3 {
+                work[i][c] = beta * work[i - 1][c] + alpha * work[i][c];
+            }
+        }
+    }
+    work[degree]
+}
+
+/// Quadratic pieces of at most 90 degrees: on-points of weight 1, middle points of weight cos(δ/2).
+fn arc(center: [f64; 2], radii: [f64; 2], tilt: f64, from: f64, to: f64) -> Result<Vec<Bezier>, String> {
+    let sweep = Dd::sum(to, -from);
+    let turn = sweep.f64().abs();
+    if !(turn > 0.0 && turn <= 360.0) {
+        return Err(format!("turns from {from} to {to} degrees; an arc must turn by more than 0 and at most 360"));
+    }
+    let count = (turn / 90.0).ceil();
+    let step = sweep / Dd::of(count);
+    let (tilt_sin, tilt_cos) = Dd::of(tilt).sin_cos_degrees();
+    let (_, weight) = (step / Dd::of(2.0)).sin_cos_degrees();
+    let at = |angle: Dd, weight: Dd| -> HomogeneousPoint {
+        let (s, c) = angle.sin_cos_degrees();
+        let (x, y) = (Dd::of(radii[0]) * c, Dd::of(radii[1]) * s);
+        // A middle point lies at 1/cos(δ/2) times the radius and has weight cos(δ/2), so its
+        // homogeneous offset is that of the rim itself.
+        [
+            Dd::of(center[0]) * weight + (x * tilt_cos - y * tilt_sin),
+            Dd::of(center[1]) * weight + (x * tilt_sin + y * tilt_cos),
+            weight,
+        ]
+    };
+    let circle = (radii[0] == radii[1]).then(|| (center.map(Dd::of), Dd::of(radii[0])));
+    let mut pieces = Vec::new();
+    let mut i = 0.0;
+    while i < count {
+        let angle = |k: f64| Dd::of(from) + step * Dd::of(k);
+        // The last angle is the given one, so that a full turn closes exactly.
+        let end = if i + 1.0 == count { Dd::of(to) } else { angle(i + 1.0) };
+        pieces.push(Bezier {
+            points: vec![at(angle(i), Dd::ONE), at(angle(i + 0.5), weight), at(end, Dd::ONE)],
+            interval: [angle(i).f64(), end.f64()],
+            circle,
+        });
+        i += 1.0;
+    }
+    Ok(pieces)
+}
+
+/// Basis functions that do not vanish on a span, in double-double.
+fn basis(degree: usize, knots: &[Dd], span: usize, u: Dd) -> Vec<Dd> {
+    let mut values = vec![Dd::ONE];
+    for j in 1..=degree {
+        let mut saved = Dd::ZERO;
+        for r in 0..j {
+            let right = knots[span + r + 1] - u;
+            let left = u - knots[span + 1 + r - j];
+            let t = values[r] / (right + left);
+            values[r] = saved + right * t;
+            saved = left * t;
+        }
+        values.push(saved);
+    }
+    values
+}
+
+fn interpolate(points: &[[f64; 2]], degree: usize) -> Result<Vec<Bezier>, String> {
+    let n = points.len();
+    if n < 2 {
+        return Err(format!("has {n} points; an interpolating curve needs at least 2"));
+    }
+    if degree == 0 {
+        return Err("has degree 0; the degree must be at least 1".into());
+    }
+    let degree = degree.min(n - 1);
+    // Chord-length parameters on [0, 1].
+    let mut parameters = vec![Dd::ZERO];
+    let mut length = Dd::ZERO;
+    for i in 1..n {
+        let d = [0, 1].map(|c| Dd::sum(points[i][c], -points[i - 1][c]));
+        let largest = d[0].f64().abs().max(d[1].f64().abs());
+        if largest == 0.0 {
+            return Err(format!(
+                "has equal points {} and {i}, ({}, {}); consecutive points must differ",
+                i - 1,
+                points[i][0],
+                points[i][1]
+            ));
+        }
+        let power = (-largest.log2().floor()).exp2();
+        let d = d.map(|c| c.scale_by_power_of_two(power));
+        length = length + (d[0] * d[0] + d[1] * d[1]).sqrt().scale_by_power_of_two(1.0 / power);
+        parameters.push(length);
+    }
+    for u in &mut parameters {
+        *u = *u / length;
+    }
+    parameters[n - 1] = Dd::ONE;
+    let mut knots = vec![Dd::ZERO; degree + 1];
+    #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
+    for j in 1..n - degree {
+        let total = parameters[j..j + degree].iter().fold(Dd::ZERO, |s, &u| s + u);
+        knots.push(total / Dd::of(degree as f64));
+    }
+    knots.extend(std::iter::repeat_n(Dd::ONE, degree + 1));
+
+    // Collocation at increasing sites is totally positive: banded elimination without pivoting is
+    // stable (de Boor & Pinkus 1977).
+    let mut rows: Vec<(usize, Vec<Dd>)> = Vec::with_capacity(n);
+    let mut span = degree;
+    for (k, &u) in parameters.iter().enumerate() {
+        while span < n - 1 && u >= knots[span + 1] {
+            span += 1;
+        }
+        let values = if k == 0 || k == n - 1 {
+            let mut row = vec![Dd::ZERO; degree + 1];
+            row[if k == 0 { 0 } else { degree }] = Dd::ONE;
+            row
+        } else {
+            basis(degree, &knots, span, u)
+        };
+        rows.push((span - degree, values));
+    }
+    let mut right: Vec<[Dd; 2]> = points.iter().copied().map(exact).collect();
+    for k in 0..n {
+        let (first, pivot_row) = (rows[k].0, rows[k].1.clone());
+        let Some(&pivot) = pivot_row.get(k.wrapping_sub(first)) else {
+            return Err("has points too unevenly spaced to interpolate".into());
+        };
+        if pivot == Dd::ZERO {
+            return Err("has points too unevenly spaced to interpolate".into());
+        }
+        for m in k + 1..(k + degree + 1).min(n) {
+            let start = rows[m].0;
+            if start > k {
+                break;
+            }
+            let factor = rows[m].1[k - start] / pivot;
+            if factor == Dd::ZERO {
+                continue;
+            }
+            for (offset, &value) in pivot_row.iter().enumerate() {
+                let column = first + offset;
+                if column >= k && column >= start && column - start < rows[m].1.len() {
+                    rows[m].1[column - start] = rows[m].1[column - start] - factor * value;
+                }
+            }
+            for c in 0..2 {
+                right[m][c] = right[m][c] - factor * right[k][c];
+            }
+        }
+    }
+    for k in (0..n).rev() {
+        let (first, row) = (rows[k].0, rows[k].1.clone());
+        for c in 0..2 {
+            let mut value = right[k][c];
+            for (offset, &factor) in row.iter().enumerate() {
+                let column = first + offset;
+                if column > k {
+                    value = value - factor * right[column][c];
+                }
+            }
+            right[k][c] = value / row[k - first];
+        }
+    }
+    right[0] = exact(points[0]);
+    right[n - 1] = exact(points[n - 1]);
+    let control: Vec<HomogeneousPoint> = right.iter().map(|p| [p[0], p[1], Dd::ONE]).collect();
+    Ok(extract(degree, &knots, &control))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::bernstein::evaluate;
+
+    fn at(b: &Bezier, t: f64) -> [Dd; 2] {
+        let c = [0, 1, 2].map(|k| evaluate(&b.points.iter().map(|p| p[k]).collect::<Vec<_>>(), Dd::of(t)));
+        [c[0] / c[2], c[1] / c[2]]
+    }
+
+    #[test]
+    fn arcs_lie_on_their_circle_to_thirty_digits() {
+        for (from, to) in [(0.0, 360.0), (350.0, 370.0), (90.0, -200.0), (17.0, 18.0)] {
+            let pieces = beziers(&ProfileCurve::Arc { center: [3.0, -1.0], radii: [0.7, 0.7], tilt: 0.0, from, to }).expect("an arc");
+            for piece in &pieces {
+                for i in 0..=8 {
+                    let p = at(piece, f64::from(i) / 8.0);
+                    let d = [p[0] - Dd::of(3.0), p[1] + Dd::ONE];
+                    let off = (d[0] * d[0] + d[1] * d[1]).sqrt() - Dd::of(0.7);
+                    assert!(off.abs().f64() < 1e-30, "{from}..{to}: off by {off:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_full_turn_closes_exactly() {
+        let pieces = beziers(&ProfileCurve::Arc { center: [1.0, 0.0], radii: [0.35, 0.35], tilt: 0.0, from: 0.0, to: 360.0 }).expect("a circle");
+        assert_eq!(pieces.len(), 4);
+        assert_eq!(pieces[0].points[0], pieces[3].points[2]);
+    }
+
+    #[test]
+    fn interpolating_curves_pass_through_their_points() {
+        let points: Vec<[f64; 2]> = (0..23).map(|i| f64::from(i)).map(|t| [2.0 + (0.7 * t).sin(), t * 0.3 + (t * 1.9).cos() * 0.2]).collect();
+        for degree in 1..=7 {
+            let pieces = beziers(&ProfileCurve::Interpolate { points: points.clone(), degree }).expect("a curve");
+            let ends: Vec<[Dd; 2]> = pieces.iter().map(|b| at(b, 0.0)).collect();
+            assert_eq!(ends[0], exact(points[0]));
+            for p in &points {
+                let nearest = pieces
+                    .iter()
+                    .flat_map(|b| (0..=400).map(move |i| at(b, f64::from(i) / 400.0)))
+                    .map(|q| (q[0].f64() - p[0]).hypot(q[1].f64() - p[1]))
+                    .fold(f64::INFINITY, f64::min);
+                assert!(nearest < 5e-3, "degree {degree}: {nearest} from {p:?}");
+            }
+        }
+    }
+}

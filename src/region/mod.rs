@@ -1,0 +1,34 @@
+//! Planar regions in the meridian half-plane: what a turn sweeps into a solid.
+//!
+//! A profile's curves become rational Bézier pieces in double-double, scaled by a power of two
+//! into the unit square and cut where they turn in r or in z. Such a *bi-monotone* piece spans
+//! exactly the box of its two ends, and every part of it the box of its own two ends. That one
+//! property carries the membership test, the row spans and the searches.
+//!
+//! ```text
+//!   curves ──> pieces ──┬──> crossings   is a point of the half-plane inside?
+//!                       └──> boundary ──┬──> distance    how far is it?
+//!                                       └──> integrals   how much is it?
+//! ```
+
+mod boundary;
+mod crossings;
+mod curve;
+mod distance;
+mod error;
+mod integrals;
+mod piece;
+mod profile;
+mod tree;
+
+pub use crossings::Winding;
+pub use curve::ProfileCurve;
+pub use distance::DistanceSet;
+pub use error::RegionError;
+pub use profile::{Boundary, Fill, ProfileLoop, Region};
+
+pub(crate) use boundary::{BoundaryPiece, filled_boundary};
+pub(crate) use crossings::{ClosedSection, MeridianPoint};
+pub(crate) use integrals::r_squared_dz as filled_integral;
+pub(crate) use piece::Piece;
+pub(crate) use tree::{Box2, BoxTree};

@@ -1,0 +1,351 @@
+//! A bi-monotone rational Bézier piece, in double-double and in f64.
+//!
+//! Neither r nor z turns within a piece, so the part between two parameters spans exactly the box
+//! of the two points. Searching a height or a radius is then bisection with a proof at each step.
+//!
+//! Lengths are in the region's unit. The f64 twin is centred on its own start, so its rounding is
+//! that of the piece's extent and not of its place:
+//!
+//! ```text
+//!   |found - exact| <= γ(6 p + 8) · max_i |P_i - origin|        for positive weights
+//! ```
+
+use super::curve::{Bezier, HomogeneousPoint};
+use super::tree::Box2;
+use crate::math::bernstein::{self, Coefficients};
+use crate::math::tolerance::{ON_BOUNDARY, PARAMETER_RESOLUTION, gamma};
+use crate::math::{Dd, Real};
+use std::cmp::Ordering;
+
+/// Where a point lies relative to a piece, looking along +r at the point's height.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Position {
+    /// The piece passes at a larger r.
+    Before,
+    /// The piece passes through the point, to the resolution of double-double.
+    On,
+    /// The piece passes at a smaller r.
+    Behind,
+}
+
+/// Uniform parameters at which every piece is tabulated.
+pub(crate) const TABLE: usize = 16;
+
+/// A part of a curve on which r and z are both monotone.
+#[derive(Debug, Clone)]
+pub(crate) struct Piece {
+    /// Homogeneous control points.
+    pub(crate) points: Vec<HomogeneousPoint>,
+    pub(crate) start: [Dd; 2],
+    pub(crate) end: [Dd; 2],
+    pub(crate) loop_index: usize,
+    /// On r = 0, where nothing is swept.
+    pub(crate) on_axis: bool,
+    /// Centre and radius of a circular piece.
+    pub(crate) circle: Option<([Dd; 2], Dd)>,
+    pub(crate) bounds: Box2,
+    pub(crate) twin: Twin,
+}
+
+/// The f64 side of a piece.
+#[derive(Debug, Clone)]
+pub(crate) struct Twin {
+    /// The point the coefficients are relative to.
+    pub(crate) origin: [f64; 2],
+    /// Coefficients of w (r - origin), w (z - origin) and w.
+    pub(crate) coefficients: [Coefficients<f64>; 3],
+    /// Bound on the rounding of an evaluated coordinate.
+    pub(crate) error: f64,
+    /// Points at the parameters i / [`TABLE`], relative to the origin; empty for segments.
+    pub(crate) table: Vec<[f64; 2]>,
+}
+
+impl Piece {
+    pub(crate) fn new(points: Vec<HomogeneousPoint>, start: [Dd; 2], end: [Dd; 2], loop_index: usize, circle: Option<([Dd; 2], Dd)>) -> Self {
+        let on_axis = points.iter().all(|p| p[0] == Dd::ZERO);
+        let twin = Twin::new(&points, start);
+        let bounds = Box2::around(start.map(Real::f64), end.map(Real::f64));
+        Self { points, start, end, loop_index, on_axis, circle, bounds, twin }
+    }
+
+    /// A straight piece.
+    pub(crate) fn segment(start: [Dd; 2], end: [Dd; 2], loop_index: usize) -> Self {
+        let points = vec![[start[0], start[1], Dd::ONE], [end[0], end[1], Dd::ONE]];
+        Self::new(points, start, end, loop_index, None)
+    }
+
+    pub(crate) fn degree(&self) -> usize {
+        self.points.len() - 1
+    }
+
+    /// Whether z does not change along the piece.
+    pub(crate) fn is_horizontal(&self) -> bool {
+        self.start[1] == self.end[1]
+    }
+
+    /// +1 where z rises from start to end, -1 where it falls, 0 for a horizontal piece.
+    pub(crate) fn direction(&self) -> i32 {
+        sign(self.end[1].partial_cmp(&self.start[1]))
+    }
+
+    /// The coefficients of one homogeneous coordinate.
+    fn coordinate(&self, c: usize) -> Coefficients<Dd> {
+        self.points.iter().map(|p| p[c]).collect()
+    }
+
+    /// The point at `t`.
+    pub(crate) fn at(&self, t: Dd) -> [Dd; 2] {
+        let [r, z, w] = [0, 1, 2].map(|c| bernstein::evaluate(&self.coordinate(c), t));
+        [r / w, z / w]
+    }
+
+    /// The part between two parameters, `a < b`.
+    pub(crate) fn part(&self, a: Dd, b: Dd, start: [Dd; 2], end: [Dd; 2]) -> Self {
+        let coordinates = [0, 1, 2].map(|c| bernstein::restrict(&self.coordinate(c), a, b));
+        let points = (0..self.points.len()).map(|i| [coordinates[0][i], coordinates[1][i], coordinates[2][i]]).collect();
+        let mut part = Self::new(points, start, end, self.loop_index, self.circle);
+        part.on_axis = self.on_axis;
+        part
+    }
+
+    /// The parameter at which coordinate `c` (0 is r, 1 is z) takes the value `v`, which must lie
+    /// within the piece's range of it.
+    pub(crate) fn parameter_at(&self, c: usize, v: Dd) -> Dd {
+        let rising = self.end[c] > self.start[c];
+        if v == self.start[c] {
+            return Dd::ZERO;
+        }
+        if v == self.end[c] {
+            return Dd::ONE;
+        }
+        let f: Coefficients<Dd> = self.points.iter().map(|p| p[c] - v * p[2]).collect();
+        let (mut lo, mut hi) = (Dd::ZERO, Dd::ONE);
+        let mut t = Dd::of(self.rough_parameter(c, v.f64()));
+        for _ in 0..240 {
+            let (value, slope) = bernstein::evaluate_with_derivative(&f, t);
+            if value == Dd::ZERO {
+                return t;
+            }
+            if (value < Dd::ZERO) == rising {
+                lo = t;
+            } else {
+                hi = t;
+            }
+            if (hi - lo).f64() <= PARAMETER_RESOLUTION {
+                break;
+            }
+            let newton = if slope == Dd::ZERO { lo } else { t - value / slope };
+            let step = (newton - t).abs().f64();
+            t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
+            if step <= PARAMETER_RESOLUTION {
+                break;
+            }
+        }
+        t
+    }
+
+    /// A start value for [`parameter_at`](Self::parameter_at): f64 bisection.
+    fn rough_parameter(&self, c: usize, v: f64) -> f64 {
+        let v = v - self.twin.origin[c];
+        let rising = self.end[c] > self.start[c];
+        let (mut lo, mut hi) = (0.0, 1.0);
+        for _ in 0..26 {
+            let t = 0.5 * (lo + hi);
+            if (self.twin.at(t)[c] < v) == rising {
+                lo = t;
+            } else {
+                hi = t;
+            }
+        }
+        0.5 * (lo + hi)
+    }
+
+    /// The other coordinate where coordinate `c` takes the value `v`.
+    pub(crate) fn other_at(&self, c: usize, v: Dd) -> Dd {
+        if self.degree() == 1 {
+            // Straight, whatever the weights.
+            let (a, b) = (self.start, self.end);
+            let s = (v - a[c]) / (b[c] - a[c]);
+            return a[1 - c] + (b[1 - c] - a[1 - c]) * s;
+        }
+        if v == self.start[c] {
+            return self.start[1 - c];
+        }
+        if v == self.end[c] {
+            return self.end[1 - c];
+        }
+        self.at(self.parameter_at(c, v))[1 - c]
+    }
+
+    /// Where the point lies, in double-double. `z` must lie within the piece's heights and the
+    /// piece must not be horizontal.
+    pub(crate) fn position_exact(&self, r: Dd, z: Dd) -> Position {
+        let difference = self.other_at(1, z) - r;
+        if difference.abs().f64() <= ON_BOUNDARY {
+            Position::On
+        } else if difference > Dd::ZERO {
+            Position::Before
+        } else {
+            Position::Behind
+        }
+    }
+
+    /// Where the point lies, in f64; `None` where the rounding does not decide. `error` bounds the
+    /// rounding of `point`, and z must lie within the piece's heights.
+    pub(crate) fn position(&self, point: [f64; 2], error: f64) -> Option<Position> {
+        let t = &self.twin;
+        let q = [point[0] - t.origin[0], point[1] - t.origin[1]];
+        let error = error + t.error + 4.0 * f64::EPSILON * (q[0].abs() + q[1].abs());
+        let decide = |a: f64, b: f64| {
+            if q[0] > a.max(b) + error {
+                Some(Position::Behind)
+            } else if q[0] < a.min(b) - error {
+                Some(Position::Before)
+            } else {
+                None
+            }
+        };
+        let end = [(self.end[0] - Dd::of(t.origin[0])).f64(), (self.end[1] - Dd::of(t.origin[1])).f64()];
+        let start = [(self.start[0] - Dd::of(t.origin[0])).f64(), (self.start[1] - Dd::of(t.origin[1])).f64()];
+        if self.degree() == 1 {
+            let (dr, dz) = (end[0] - start[0], end[1] - start[1]);
+            let (qr, qz) = (q[0] - start[0], q[1] - start[1]);
+            let side = qr * dz - qz * dr;
+            let bound = error * (dr.abs() + dz.abs()) + gamma(8.0) * (qr.abs() * dz.abs() + qz.abs() * dr.abs());
+            // Positive on the right of a rising segment, that is behind it.
+            return match side.abs() > bound {
+                true if (side > 0.0) == (dz > 0.0) => Some(Position::Behind),
+                true => Some(Position::Before),
+                false => None,
+            };
+        }
+        let (mut lo, mut hi) = (0.0_f64, 1.0_f64);
+        let (mut a, mut b) = (start, end);
+        let rising = end[1] > start[1];
+        let below = |p: [f64; 2]| match (p[1] - q[1]).abs() > error {
+            true => Some((p[1] < q[1]) == rising),
+            false => None,
+        };
+        if !t.table.is_empty() {
+            // The table narrows the bracket to one interval, two where a node is at the height.
+            #[allow(clippy::cast_precision_loss, reason = "a small count")]
+            let parameter = |i: usize| i as f64 / TABLE as f64;
+            let first_not_below = t.table.partition_point(|&p| below(p) == Some(true));
+            let first_above = t.table.partition_point(|&p| below(p) != Some(false));
+            if first_not_below > 0 {
+                lo = parameter(first_not_below - 1);
+                a = t.table[first_not_below - 1];
+            }
+            if first_above <= TABLE {
+                hi = parameter(first_above);
+                b = t.table[first_above];
+            }
+        }
+        for step in 0..64 {
+            if let Some(answer) = decide(a[0], b[0]) {
+                return Some(answer);
+            }
+            let secant = lo + (hi - lo) * ((q[1] - a[1]) / (b[1] - a[1]));
+            let middle = 0.5 * (lo + hi);
+            // Secant and bisection in turn: the one is quick, the other shrinks both ends.
+            let m = if step % 2 == 0 && secant > lo && secant < hi { 0.98 * secant + 0.02 * middle } else { middle };
+            if !(m > lo && m < hi) {
+                return None;
+            }
+            let p = t.at(m);
+            match below(p) {
+                Some(true) => (lo, a) = (m, p),
+                Some(false) => (hi, b) = (m, p),
+                None => return None,
+            }
+        }
+        None
+    }
+}
+
+impl Piece {
+    /// The piece under `r -> k r`, `z -> h z + d`, as coaxial frames differ.
+    pub(crate) fn mapped(&self, k: Dd, h: Dd, d: Dd) -> Self {
+        let point = |p: [Dd; 2]| [p[0] * k, p[1] * h + d];
+        let points = self.points.iter().map(|p| [p[0] * k, p[1] * h + d * p[2], p[2]]).collect();
+        let circle = self.circle.map(|(c, r)| (point(c), r * k));
+        let mut mapped = Self::new(points, point(self.start), point(self.end), self.loop_index, circle);
+        mapped.on_axis = self.on_axis;
+        mapped
+    }
+}
+
+/// -1, 0 or 1.
+pub(crate) fn sign(o: Option<Ordering>) -> i32 {
+    match o {
+        Some(Ordering::Greater) => 1,
+        Some(Ordering::Less) => -1,
+        _ => 0,
+    }
+}
+
+impl Twin {
+    fn new(points: &[HomogeneousPoint], start: [Dd; 2]) -> Self {
+        let origin = start.map(Real::f64);
+        // A power of two brings the largest weight near 1; the curve does not see it.
+        let largest = points.iter().fold(0.0_f64, |m, p| m.max(p[2].f64()));
+        let power = (-largest.log2().floor()).exp2();
+        let coefficients = [0, 1, 2].map(|c| -> Coefficients<f64> {
+            points
+                .iter()
+                .map(|p| if c < 2 { p[c] - Dd::of(origin[c]) * p[2] } else { p[2] }.scale_by_power_of_two(power).f64())
+                .collect()
+        });
+        let w = &coefficients[2];
+        let reach = |c: usize| coefficients[c].iter().zip(w).fold(0.0_f64, |m, (v, w)| m.max((v / w).abs()));
+        #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
+        let error = gamma(6.0 * (points.len() as f64) + 8.0) * reach(0).max(reach(1));
+        Self { origin, coefficients, error, table: Vec::new() }
+    }
+
+    /// The point at `t`, relative to the origin.
+    #[inline]
+    pub(crate) fn at(&self, t: f64) -> [f64; 2] {
+        let w = bernstein::evaluate(&self.coefficients[2], t);
+        [0, 1].map(|c| bernstein::evaluate(&self.coefficients[c], t) / w)
+    }
+}
+
+/// Cuts a Bézier piece of a curve, already in the region's unit, where r or z turns and where r
+/// changes sign. Returns parameters and points of the cuts, both ends included.
+pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
+    let coordinate = |c: usize| -> Coefficients<Dd> { bezier.points.iter().map(|p| p[c]).collect() };
+    let [r, z, w] = [coordinate(0), coordinate(1), coordinate(2)];
+    let polynomial = w.iter().all(|x| *x == w[0]);
+    let mut parameters = Vec::new();
+    for c in [&r, &z] {
+        let turning = if polynomial { bernstein::derivative(c) } else { bernstein::quotient_derivative(c, &w) };
+        parameters.extend(bernstein::sign_change_parameters(&turning));
+    }
+    if r.iter().any(|x| *x < Dd::ZERO) {
+        parameters.extend(bernstein::sign_change_parameters(&r));
+    }
+    parameters.sort_by(|a, b| a.partial_cmp(b).expect("parameters are numbers"));
+    // Cuts closer than this would leave pieces that double-double cannot evaluate usefully.
+    let merge = (-80.0_f64).exp2();
+    let mut kept: Vec<Dd> = vec![Dd::ZERO];
+    for t in parameters {
+        if (t - *kept.last().expect("never empty")).f64() > merge && (Dd::ONE - t).f64() > merge {
+            kept.push(t);
+        }
+    }
+    kept.push(Dd::ONE);
+    let last = bezier.points.len() - 1;
+    kept.into_iter()
+        .map(|t| {
+            let [a, b, c] = if t == Dd::ZERO {
+                bezier.points[0]
+            } else if t == Dd::ONE {
+                bezier.points[last]
+            } else {
+                [bernstein::evaluate(&r, t), bernstein::evaluate(&z, t), bernstein::evaluate(&w, t)]
+            };
+            (t, [a / c, b / c])
+        })
+        .collect()
+}

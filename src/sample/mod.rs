@@ -1,0 +1,12 @@
+//! Where a solid meets a grid: layers of occupancy, volume fraction, signed distance and material.
+//!
+//! The unit of work is a z layer. Its rows are filled in runs between the cuts of
+//! [`crate::solid`], so that one point test serves a whole run; distances and fractions follow row
+//! by row. Layers do not depend on each other: any number of threads gives the same values.
+
+mod fraction;
+mod layer;
+mod volume;
+
+pub use layer::{Channel, LayerBuffers, LayerSampler, Selection};
+pub use volume::{fraction, material, occupancy, signed_distance};

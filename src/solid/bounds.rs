@@ -1,0 +1,80 @@
+//! Exact bounds.
+//!
+//! The largest coordinate along a world direction u of a turned point is
+//!
+//! ```text
+//!   o·u + s (a z + m r),   a = e₃·u,   m = max over the turn of e(φ)·u
+//! ```
+//!
+//! and a linear function of (r, z) is largest on the boundary, where its derivative changes sign or
+//! at an end of a piece.
+
+use super::turn::Turn;
+use crate::math::bernstein::{self, Coefficients};
+use crate::math::{Aabb, Dd, Real, Similarity};
+use crate::region::BoundaryPiece;
+use glam::DVec3;
+
+pub(super) fn bounds(frame: &Similarity, turn: &Turn, boundary: &[BoundaryPiece]) -> Aabb {
+    let mut min = DVec3::ZERO;
+    let mut max = DVec3::ZERO;
+    let scale = frame.scale_exact();
+    for k in 0..3 {
+        let [x, y, a] = [0, 1, 2].map(|i| frame.axis_exact(i)[k]);
+        let origin = frame.origin_exact()[k];
+        for (sign, out) in [(Dd::ONE, &mut max), (-Dd::ONE, &mut min)] {
+            let m = largest_over_turn(turn, [x * sign, y * sign]);
+            let extent = support(boundary, a * sign, m);
+            out[k] = (origin + scale * extent * sign).f64();
+        }
+    }
+    Aabb { min, max }
+}
+
+/// The largest of v·(cos φ, sin φ) over the turn.
+fn largest_over_turn(turn: &Turn, v: [Dd; 2]) -> Dd {
+    let length = if v[1] == Dd::ZERO {
+        v[0].abs()
+    } else if v[0] == Dd::ZERO {
+        v[1].abs()
+    } else {
+        (v[0] * v[0] + v[1] * v[1]).sqrt()
+    };
+    match turn {
+        Turn::Full => length,
+        Turn::Partial(wedge) => {
+            if wedge.contains_exact(v) && length > Dd::ZERO {
+                return length;
+            }
+            let [s, e] = wedge.directions_exact().map(|d| d[0] * v[0] + d[1] * v[1]);
+            if s > e { s } else { e }
+        }
+    }
+}
+
+/// The largest a z + m r on the boundary.
+fn support(boundary: &[BoundaryPiece], a: Dd, m: Dd) -> Dd {
+    let value = |p: [Dd; 2]| a * p[1] + m * p[0];
+    let ends = boundary.iter().flat_map(|b| [value(b.piece.start), value(b.piece.end)]);
+    let mut best = ends.fold(Dd::of(f64::NEG_INFINITY), |m, v| if v > m { v } else { m });
+    if a == Dd::ZERO || m == Dd::ZERO {
+        return best;
+    }
+    for piece in boundary.iter().map(|b| &b.piece).filter(|p| p.degree() > 1) {
+        let b = &piece.bounds;
+        let (af, mf) = (a.f64(), m.f64());
+        let corner = (af * b.min[1]).max(af * b.max[1]) + (mf * b.min[0]).max(mf * b.max[0]);
+        if corner < best.f64() {
+            continue;
+        }
+        let f: Coefficients<Dd> = piece.points.iter().map(|p| a * p[1] + m * p[0]).collect();
+        let w: Coefficients<Dd> = piece.points.iter().map(|p| p[2]).collect();
+        for t in bernstein::sign_change_parameters(&bernstein::quotient_derivative(&f, &w)) {
+            let v = value(piece.at(t));
+            if v > best {
+                best = v;
+            }
+        }
+    }
+    best
+}

@@ -1,0 +1,19 @@
+//! Solids of revolution in space: regions of the half-plane, turned, placed and joined.
+//!
+//! A point of space becomes a point (ρ, z) of the half-plane in the solid's own frame. For a full
+//! turn the nearest boundary point lies in that half-plane, so membership and distance are those
+//! of the region. A partial turn adds two flat caps.
+
+mod assembly;
+mod body;
+mod bounds;
+mod fraction;
+mod row;
+mod turn;
+
+pub use assembly::{Assembly, Part};
+pub use body::Body;
+pub use turn::Turn;
+
+pub(crate) use fraction::CellShape;
+pub(crate) use row::{Cuts, LayerCuts, Row};

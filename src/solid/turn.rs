@@ -1,0 +1,119 @@
+//! How far a profile is turned.
+
+use crate::math::tolerance::{ON_BOUNDARY, U};
+use crate::math::{Dd, Real};
+use glam::DVec2;
+
+/// A full turn, or the wedge between two half-planes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Turn {
+    /// 360 degrees.
+    Full,
+    /// Less than 360 degrees, counter-clockwise seen from the tip of the axis.
+    Partial(Wedge),
+}
+
+/// The wedge from a start to an end direction in the plane normal to the axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wedge {
+    start: [Dd; 2],
+    end: [Dd; 2],
+    /// Angle turned, in degrees.
+    degrees: f64,
+    /// Where the turn starts, in degrees.
+    from: f64,
+}
+
+impl Turn {
+    /// A turn by `degrees` (more than 0, at most 360) from `from` degrees.
+    #[must_use]
+    pub fn new(from: f64, degrees: f64) -> Self {
+        if degrees >= 360.0 {
+            return Self::Full;
+        }
+        let direction = |a: Dd| {
+            let (s, c) = a.sin_cos_degrees();
+            [c, s]
+        };
+        Self::Partial(Wedge { start: direction(Dd::of(from)), end: direction(Dd::sum(from, degrees)), degrees, from })
+    }
+
+    /// The angle turned, in degrees.
+    #[must_use]
+    pub fn degrees(&self) -> f64 {
+        match self {
+            Self::Full => 360.0,
+            Self::Partial(w) => w.degrees,
+        }
+    }
+
+    /// The angle turned, in radians.
+    #[must_use]
+    pub fn radians(&self) -> f64 {
+        match self {
+            Self::Full => std::f64::consts::TAU,
+            Self::Partial(w) => w.degrees.to_radians(),
+        }
+    }
+}
+
+impl Wedge {
+    /// The angle turned, in degrees.
+    #[must_use]
+    pub fn degrees(&self) -> f64 {
+        self.degrees
+    }
+
+    /// Where the turn starts, in degrees.
+    #[must_use]
+    pub fn from(&self) -> f64 {
+        self.from
+    }
+
+    /// Unit vectors along the two caps.
+    #[must_use]
+    pub fn directions(&self) -> [DVec2; 2] {
+        [self.start, self.end].map(|d| DVec2::new(d[0].f64(), d[1].f64()))
+    }
+
+    /// The same in double-double.
+    #[must_use]
+    pub fn directions_exact(&self) -> [[Dd; 2]; 2] {
+        [self.start, self.end]
+    }
+
+    /// Whether the wedge is larger than half a turn.
+    #[must_use]
+    pub fn is_reflex(&self) -> bool {
+        self.degrees > 180.0
+    }
+
+    fn combine(&self, left_of_start: bool, right_of_end: bool) -> bool {
+        if self.is_reflex() { left_of_start || right_of_end } else { left_of_start && right_of_end }
+    }
+
+    /// Whether the closed wedge holds a point known to within `error`; `None` where that does not
+    /// decide.
+    pub(crate) fn contains(&self, p: DVec2, error: f64) -> Option<bool> {
+        let [s, e] = self.directions();
+        let bound = 2.0 * error + 8.0 * U * (p.x.abs() + p.y.abs());
+        let (a, b) = (s.perp_dot(p), p.perp_dot(e));
+        if a.abs() <= bound || b.abs() <= bound {
+            // One side alone may already decide.
+            let (sure_a, sure_b) = (a.abs() > bound, b.abs() > bound);
+            return match self.is_reflex() {
+                true if sure_a && a > 0.0 || sure_b && b > 0.0 => Some(true),
+                false if sure_a && a < 0.0 || sure_b && b < 0.0 => Some(false),
+                _ => None,
+            };
+        }
+        Some(self.combine(a > 0.0, b > 0.0))
+    }
+
+    /// Whether the closed wedge holds a point; one met by a cap is inside.
+    pub(crate) fn contains_exact(&self, p: [Dd; 2]) -> bool {
+        let cross = |a: [Dd; 2], b: [Dd; 2]| a[0] * b[1] - a[1] * b[0];
+        let not_negative = |v: Dd| v.f64() >= -ON_BOUNDARY;
+        self.combine(not_negative(cross(self.start, p)), not_negative(cross(p, self.end)))
+    }
+}
