@@ -20,15 +20,18 @@ use std::io::Read;
 use std::path::Path;
 
 mod error;
+mod fields;
 mod json;
 mod keys;
 mod limits;
 mod model;
 mod points;
+mod profile;
 mod read;
 mod resolve;
 mod schema;
 mod set;
+mod solid;
 #[cfg(test)]
 mod tests;
 mod value;

@@ -101,7 +101,7 @@ fn parse(text: &str, source: u32, limit: usize) -> Result<FilePoints, Fault> {
             Some(rest) if start == 0 => (rest, start + '\u{feff}'.len_utf8()),
             _ => (line, start),
         };
-        let line = line.split('#').next().unwrap_or_default();
+        let line = line.split('#').next().unwrap_or_default().trim_end();
         let Some((numbers, count, places)) = parse_line(line, start, source)? else {
             continue;
         };
@@ -126,7 +126,7 @@ fn parse(text: &str, source: u32, limit: usize) -> Result<FilePoints, Fault> {
         });
         if count == 3 {
             if numbers[2] <= 0.0 {
-                return Err(Fault::value(places[2], super::read::WEIGHT));
+                return Err(Fault::value(places[2], super::fields::WEIGHT));
             }
             weight_place.get_or_insert(places[2]);
             weights.push(numbers[2]);
@@ -197,7 +197,7 @@ fn parse_line(
             .parse()
             .ok()
             .filter(|number: &f64| number.abs() <= MAX_MAGNITUDE)
-            .ok_or_else(|| Fault::value(place, super::read::FINITE))?;
+            .ok_or_else(|| Fault::value(place, super::fields::FINITE))?;
         places[count] = place;
         count += 1;
         at = skip(at + length);
