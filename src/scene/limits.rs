@@ -7,8 +7,13 @@
 /// times its densest text, so this also bounds the memory that reading takes.
 pub const MAX_TEXT_BYTES: usize = 64 << 20;
 
-/// Nesting of arrays and tables in JSON. A scene needs eight; the reader recurses once per level.
+/// Nesting of arrays and tables. A scene needs eight; the reader recurses once per level.
 pub(super) const MAX_DEPTH: usize = 64;
+
+/// Stack of the thread that reads TOML. The parser limits brackets inside each other to 80 and the
+/// parts of a dotted key to 80, so a tree of 80 * 80 levels can come out, which is dropped by
+/// recursion; this leaves 10 kB a level. The memory is touched only as far as it is used.
+pub(super) const TOML_STACK_BYTES: usize = 64 << 20;
 
 /// Segments of a `--set` path.
 pub(super) const MAX_SET_SEGMENTS: usize = 32;

@@ -701,6 +701,14 @@ fn hostile_text_is_refused() {
         assert!(toml(&format!("a = {}", open.repeat(100_000))).is_err());
     }
     assert!(toml(&format!("{} = 1", vec!["a"; 100_000].join("."))).is_err());
+    // Dotted keys nest without a bracket: 70 times 70 levels. Reading and dropping that took more
+    // stack than a thread of the test runner has.
+    let key = ["a"; 70].join(".");
+    let open = format!("{{ {key} = ").repeat(70);
+    let deep = format!("{key} = {open}1{}", " }".repeat(70));
+    let shown = message(toml(&deep));
+    assert!(shown.contains("deeper nesting"), "{shown}");
+    assert!(message(with_sets(SMALL, &[&deep])).contains("found"));
     let long = "x".repeat(1 << 20);
     let shown = message(toml(&small(
         "schema = 1",

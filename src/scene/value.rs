@@ -4,6 +4,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{Fault, Place, shorten};
+use super::limits::{MAX_DEPTH, TOML_STACK_BYTES};
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]
@@ -59,19 +60,43 @@ impl Value {
 
 /// Reads a TOML document. `source` is the index of `text` among the sources.
 pub(super) fn from_toml(text: &str, source: u32) -> Result<Value, Fault> {
-    let table = DeTable::parse(text).map_err(|error| toml_fault(text, source, &error))?;
-    let (span, table) = (table.span(), table.into_inner());
-    Ok(Value {
-        kind: table_kind(table, source, 0)?,
-        place: Place::new(source, span),
+    with_stack(|| {
+        let table = DeTable::parse(text).map_err(|error| toml_fault(text, source, &error))?;
+        let (span, table) = (table.span(), table.into_inner());
+        Ok(Value {
+            kind: table_kind(table, source, 0, 0)?,
+            place: Place::new(source, span),
+        })
+    })
+    .unwrap_or_else(|error| {
+        let place = Place::new(source, 0..0);
+        Err(Fault::read(place, "the scene".to_owned(), error))
     })
 }
 
 /// Reads a lone TOML value that stands at byte `offset` of text `source`; `None` if it is not TOML.
 pub(super) fn from_toml_value(text: &str, source: u32, offset: usize) -> Option<Value> {
-    DeValue::parse(text)
-        .ok()
-        .and_then(|value| convert(value, source, offset).ok())
+    with_stack(|| {
+        DeValue::parse(text)
+            .ok()
+            .and_then(|value| convert(value, source, offset, 0).ok())
+    })
+    .ok()
+    .flatten()
+}
+
+/// Does the work where recursion has room: see [`TOML_STACK_BYTES`].
+fn with_stack<T: Send>(work: impl FnOnce() -> T + Send) -> std::io::Result<T> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new()
+            .name("toml".to_owned())
+            .stack_size(TOML_STACK_BYTES)
+            .spawn_scoped(scope, work)?;
+        match thread.join() {
+            Ok(value) => Ok(value),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    })
 }
 
 fn toml_fault(text: &str, source: u32, error: &toml::de::Error) -> Fault {
@@ -97,9 +122,21 @@ fn toml_fault(text: &str, source: u32, error: &toml::de::Error) -> Fault {
     Fault::found(place, found, format!("valid toml ({reason})"))
 }
 
-fn convert(value: Spanned<DeValue<'_>>, source: u32, offset: usize) -> Result<Value, Fault> {
+fn convert(
+    value: Spanned<DeValue<'_>>,
+    source: u32,
+    offset: usize,
+    depth: usize,
+) -> Result<Value, Fault> {
     let span = value.span();
     let place = Place::new(source, span.start + offset..span.end + offset);
+    if depth > MAX_DEPTH {
+        return Err(Fault::found(
+            place,
+            "deeper nesting",
+            format!("at most {MAX_DEPTH} arrays and tables inside each other"),
+        ));
+    }
     let kind = match value.into_inner() {
         DeValue::String(text) => Kind::String(text.into_owned()),
         DeValue::Boolean(is) => Kind::Bool(is),
@@ -113,10 +150,10 @@ fn convert(value: Spanned<DeValue<'_>>, source: u32, offset: usize) -> Result<Va
         DeValue::Array(array) => Kind::Array(
             array
                 .into_iter()
-                .map(|element| convert(element, source, offset))
+                .map(|element| convert(element, source, offset, depth + 1))
                 .collect::<Result<_, _>>()?,
         ),
-        DeValue::Table(table) => table_kind(table, source, offset)?,
+        DeValue::Table(table) => table_kind(table, source, offset, depth)?,
     };
     Ok(Value { kind, place })
 }
@@ -128,7 +165,7 @@ fn float(text: &str, place: Place) -> Result<Kind, Fault> {
         .map_err(|_| Fault::value(place, "a number"))
 }
 
-fn table_kind(table: DeTable<'_>, source: u32, offset: usize) -> Result<Kind, Fault> {
+fn table_kind(table: DeTable<'_>, source: u32, offset: usize, depth: usize) -> Result<Kind, Fault> {
     let mut entries = table
         .into_iter()
         .map(|(key, value)| {
@@ -136,7 +173,7 @@ fn table_kind(table: DeTable<'_>, source: u32, offset: usize) -> Result<Kind, Fa
             Ok(Entry {
                 key: key.into_inner().into_owned(),
                 key_place: Place::new(source, span.start + offset..span.end + offset),
-                value: convert(value, source, offset)?,
+                value: convert(value, source, offset, depth + 1)?,
             })
         })
         .collect::<Result<Vec<_>, Fault>>()?;
