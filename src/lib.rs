@@ -3,4 +3,5 @@
 pub mod grid;
 pub mod math;
 pub mod region;
+pub mod scene;
 pub mod solid;

@@ -1,0 +1,51 @@
+//! What a scene may hold at most, each with its reason.
+//!
+//! The limits keep hostile input from exhausting memory or the stack, and keep every later product
+//! and quotient of scene numbers inside the range of f64. Real scenes stay orders of magnitude inside.
+
+/// Bytes of scene text, and of all point files of a scene together. A tree of values is some forty
+/// times its densest text, so this also bounds the memory that reading takes.
+pub const MAX_TEXT_BYTES: usize = 64 << 20;
+
+/// Nesting of arrays and tables. A scene needs eight; the reader recurses once per level.
+pub(super) const MAX_DEPTH: usize = 64;
+
+/// Stack of the thread that reads TOML. The parser limits brackets inside each other to 80 and the
+/// parts of a dotted key to 80, so a tree of 80 * 80 levels can come out, which is dropped by
+/// recursion; this leaves 10 kB a level. The memory is touched only as far as it is used.
+pub(super) const TOML_STACK_BYTES: usize = 64 << 20;
+
+/// Segments of a `--set` path.
+pub(super) const MAX_SET_SEGMENTS: usize = 32;
+
+/// Points read from files by one scene, all curves together, so that a short scene that names one
+/// long file many times stays bounded.
+pub const MAX_FILE_POINTS: usize = 1_000_000;
+
+/// Magnitude of coordinates, lengths, knots and angles. Cubes of it stay finite (1e300), so that
+/// volumes do; a length beyond it is a slip.
+pub const MAX_MAGNITUDE: f64 = 1e100;
+
+/// Least magnitude of a length, a factor or a direction: its cube stays a normal number.
+pub const MIN_MAGNITUDE: f64 = 1e-100;
+
+/// Degree of a curve. Bernstein coefficients of a product of two curves have binomials of twice the
+/// degree, and those of 64 still fit f64 to the last digit that matters.
+pub const MAX_DEGREE: usize = 32;
+
+/// Voxels along one side of a grid: what an OpenEXR window can number.
+pub const MAX_VOXELS: u32 = i32::MAX as u32;
+
+/// Least sine of the angle between an axis and its zero-angle direction. Below it the direction left
+/// after projecting has fewer than seven digits.
+pub const MIN_SINE: f64 = 1e-9;
+
+/// Characters of the name of a scene, profile, solid or material: names go into file headers.
+pub const MAX_NAME: usize = 255;
+
+/// Characters of a value that an error repeats.
+pub(super) const MAX_SHOWN: usize = 60;
+
+/// Characters of a word for which a nearest name is looked up; comparing longer ones takes time and
+/// helps nobody.
+pub(super) const MAX_HINTED: usize = 64;

@@ -1,0 +1,395 @@
+//! A scene as plain data: every default filled in, every value checked by itself, nothing computed.
+//!
+//! Lengths are in the scene's units, angles in degrees as written. The geometry that follows from
+//! the data (loops that close, r >= 0, bounds) is not looked at here; errors found there are placed
+//! with [`SceneModel::sources`], the `place` and the `path` of each part.
+
+use std::collections::BTreeMap;
+
+use super::error::{Place, SceneError, Sources};
+
+/// An enum whose variants have names in scene files.
+macro_rules! named {
+    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $text:literal,)+ }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[non_exhaustive]
+        pub enum $name { $($(#[$variant_doc])* $variant,)+ }
+
+        impl $name {
+            /// Every variant, in the order of the documentation.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)+];
+
+            /// The name in scene files.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $text,)+ }
+            }
+
+            /// The variant of that name.
+            pub fn from_name(name: &str) -> Option<Self> {
+                match name { $($text => Some(Self::$variant),)+ _ => None }
+            }
+        }
+    };
+}
+
+named! {
+    /// What one unit of length is. A label: nothing is rescaled.
+    Units {
+        /// Metre.
+        Metre = "m",
+        /// Centimetre.
+        Centimetre = "cm",
+        /// Millimetre.
+        Millimetre = "mm",
+        /// Micrometre.
+        Micrometre = "um",
+        /// Nanometre.
+        Nanometre = "nm",
+        /// Kilometre.
+        Kilometre = "km",
+        /// Inch.
+        Inch = "in",
+        /// Foot.
+        Foot = "ft",
+    }
+}
+
+named! {
+    /// A value sampled at every voxel.
+    ChannelName {
+        /// 1 where the voxel's centre is inside, else 0.
+        Occupancy = "occupancy",
+        /// The part of the voxel's volume that is inside.
+        Fraction = "fraction",
+        /// Signed distance of the voxel's centre, negative inside.
+        Sdf = "sdf",
+        /// The material's id, 0 where empty.
+        Material = "material",
+    }
+}
+
+named! {
+    /// A file format of the samples.
+    FormatName {
+        /// A stack of OpenEXR images, one for each layer.
+        Exr = "exr",
+    }
+}
+
+named! {
+    /// How the samples are compressed.
+    CompressionName {
+        /// Chosen from the channels for write speed; lossless.
+        Auto = "auto",
+        /// Not at all.
+        None = "none",
+        /// Run lengths.
+        Rle = "rle",
+        /// Deflate, line by line.
+        Zips = "zips",
+        /// Deflate, 16 lines at a time.
+        Zip = "zip",
+        /// Wavelet and Huffman.
+        Piz = "piz",
+        /// Floats cut to 24 bits: lossy.
+        Pxr24 = "pxr24",
+    }
+}
+
+named! {
+    /// How the curves of a profile make a region.
+    Boundary {
+        /// The curves form closed loops; the region is what they enclose.
+        Closed = "closed",
+        /// The curves form one open chain; the region lies between it and the axis.
+        ToAxis = "to-axis",
+    }
+}
+
+named! {
+    /// How several loops combine.
+    Fill {
+        /// Inside where the winding number is odd.
+        EvenOdd = "even-odd",
+        /// Inside where the winding number is not zero.
+        NonZero = "nonzero",
+    }
+}
+
+named! {
+    /// What a solid does to what the solids before it have made.
+    Operation {
+        /// Union.
+        Add = "add",
+        /// Difference.
+        Subtract = "subtract",
+        /// Intersection.
+        Intersect = "intersect",
+    }
+}
+
+/// A whole scene.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct SceneModel {
+    /// Name of the scene.
+    pub name: String,
+    /// What a unit of length is.
+    pub units: Units,
+    /// Where the voxels are.
+    pub grid: GridModel,
+    /// What is written.
+    pub output: OutputModel,
+    /// Names of material ids.
+    pub materials: BTreeMap<u32, String>,
+    /// Profiles in the order of their names.
+    pub profiles: Vec<(String, ProfileModel)>,
+    /// Solids, at least one, in the order in which they combine.
+    pub solids: Vec<SolidModel>,
+    /// The texts all places refer to.
+    pub sources: Sources,
+}
+
+impl SceneModel {
+    /// An error about the value at `place`; see [`Sources::error`].
+    pub fn error(
+        &self,
+        place: Place,
+        path: &str,
+        found: Option<String>,
+        wanted: &str,
+        hint: Option<String>,
+    ) -> SceneError {
+        self.sources.error(place, path, found, wanted, hint)
+    }
+}
+
+/// Where the voxels are: `[grid]`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct GridModel {
+    /// Size or number of the voxels.
+    pub step: GridStep,
+    /// The box to fill, minimum and maximum corner; `None` for the bounds of the added solids, and
+    /// for a verbatim grid.
+    pub bounds: Option<[[f64; 3]; 2]>,
+    /// Voxels added on every side; means nothing with `bounds` or a verbatim grid.
+    pub padding: u32,
+    /// The table, or the scene where there is none.
+    pub place: Place,
+}
+
+/// Size or number of the voxels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum GridStep {
+    /// Voxels along the longest side.
+    Resolution(u32),
+    /// Voxels along each side.
+    Resolutions([u32; 3]),
+    /// Size of a voxel along each axis.
+    Spacing([f64; 3]),
+    /// The grid as it stands.
+    Verbatim {
+        /// Minimum corner of the first voxel.
+        origin: [f64; 3],
+        /// Size of a voxel.
+        spacing: [f64; 3],
+        /// Number of voxels.
+        dims: [u32; 3],
+    },
+}
+
+/// What is written: `[output]`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct OutputModel {
+    /// What is sampled, each once.
+    pub channels: Vec<ChannelName>,
+    /// Files, each once.
+    pub formats: Vec<FormatName>,
+    /// Compression of the files.
+    pub compression: CompressionName,
+    /// Half width, in voxels, of the band the distance is clamped to.
+    pub band: Option<f64>,
+    /// The table, or the scene where there is none.
+    pub place: Place,
+}
+
+/// A region of the meridian half-plane: `[profiles.NAME]`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ProfileModel {
+    /// How the curves make a region.
+    pub boundary: Boundary,
+    /// How several loops combine.
+    pub fill: Fill,
+    /// The loop (closed) or the open chain (to-axis), never empty; `None` where `loops` holds
+    /// everything.
+    pub curves: Option<Vec<CurveModel>>,
+    /// Closed loops, none of them empty.
+    pub loops: Vec<Vec<CurveModel>>,
+    /// The table.
+    pub place: Place,
+    /// `profiles.bowl`.
+    pub path: String,
+}
+
+/// One curve of a profile.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct CurveModel {
+    /// The curve as written.
+    pub kind: CurveKind,
+    /// Whether it is run through backwards.
+    pub reverse: bool,
+    /// The table.
+    pub place: Place,
+    /// `profiles.bowl.curves[2]`.
+    pub path: String,
+}
+
+/// A point of the meridian half-plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct PointModel {
+    /// Distance from the axis; negative for a control point outside the half-plane.
+    pub r: f64,
+    /// Height along the axis.
+    pub z: f64,
+    /// In the scene, or in the file of points.
+    pub place: Place,
+}
+
+/// The kinds of curves.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum CurveKind {
+    /// A rational B-spline.
+    Nurbs {
+        /// Degree, from 1 and below the number of points.
+        degree: usize,
+        /// Control points.
+        points: Vec<PointModel>,
+        /// One for each point, finite and positive.
+        weights: Vec<f64>,
+        /// Points + degree + 1 knots, not decreasing, interior multiplicity at most the degree.
+        knots: Vec<f64>,
+    },
+    /// A rational Bézier curve, its degree one less than the points.
+    Bezier {
+        /// Control points, at least 2.
+        points: Vec<PointModel>,
+        /// One for each point, finite and positive.
+        weights: Vec<f64>,
+    },
+    /// Straight segments.
+    Polyline {
+        /// Corners, at least 2.
+        points: Vec<PointModel>,
+    },
+    /// A circular arc; counter-clockwise where `from < to`.
+    Arc {
+        /// Centre (r, z).
+        center: [f64; 2],
+        /// Radius.
+        radius: f64,
+        /// Angle of the start in degrees, from +r towards +z.
+        from: f64,
+        /// Angle of the end in degrees; not `from`, and within 360 of it.
+        to: f64,
+    },
+    /// A full circle, counter-clockwise.
+    Circle {
+        /// Centre (r, z).
+        center: [f64; 2],
+        /// Radius.
+        radius: f64,
+    },
+    /// A full ellipse, counter-clockwise.
+    Ellipse {
+        /// Centre (r, z).
+        center: [f64; 2],
+        /// Half axes, before the tilt along r and z.
+        radii: [f64; 2],
+        /// Turn about the centre in degrees, counter-clockwise.
+        tilt: f64,
+    },
+    /// The clamped spline through the points.
+    Interpolate {
+        /// Points, at least 2.
+        points: Vec<PointModel>,
+        /// Degree, already reduced to one less than the points where there are few.
+        degree: usize,
+    },
+}
+
+/// A solid: `[[solid]]`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct SolidModel {
+    /// Name, unique in the scene.
+    pub name: String,
+    /// What it is made from.
+    pub kind: SolidKind,
+    /// Steps that place it, first to last.
+    pub steps: Vec<PlaceStep>,
+    /// What it does to what the solids before it have made.
+    pub operation: Operation,
+    /// Id of the material, from 1.
+    pub material: u32,
+    /// The table.
+    pub place: Place,
+    /// `solid[1]`.
+    pub path: String,
+}
+
+/// The kinds of solids.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum SolidKind {
+    /// A profile turned about an axis.
+    Revolve {
+        /// Index of the profile in [`SceneModel::profiles`].
+        profile: usize,
+        /// Angle turned in degrees, above 0 and at most 360.
+        angle: f64,
+        /// Angle at which the turn starts, in degrees.
+        start: f64,
+        /// The axis.
+        axis: AxisModel,
+    },
+}
+
+/// An axis of revolution.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct AxisModel {
+    /// A point of the axis, height 0.
+    pub origin: [f64; 3],
+    /// Direction of the axis, not zero, of any length.
+    pub direction: [f64; 3],
+    /// Zero-angle direction, not parallel to the axis; `None` for +x, or +y where the axis is
+    /// within a degree of +-x.
+    pub x: Option<[f64; 3]>,
+    /// The table, or the solid where there is none.
+    pub place: Place,
+}
+
+/// A step that places a solid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum PlaceStep {
+    /// Scaling about the origin by a positive factor.
+    Scale(f64),
+    /// Turning about an axis through the origin.
+    Rotate {
+        /// Direction, not zero, of any length.
+        axis: [f64; 3],
+        /// Angle in degrees, counter-clockwise seen from the tip of the axis.
+        degrees: f64,
+    },
+    /// Moving.
+    Translate([f64; 3]),
+}

@@ -1,0 +1,218 @@
+//! A scene with every default and every file of points written out, as JSON.
+//!
+//! The result is itself a scene: reading it gives the same data, and resolving that gives the same
+//! text, bit for bit. Keys are in alphabetical order and floats in their shortest form that reads
+//! back exactly, so equal scenes have equal text and the text can be hashed.
+
+use serde_json::{Map, Value, json};
+
+use super::model::{
+    AxisModel, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PlaceStep, PointModel,
+    ProfileModel, SceneModel, SolidKind, SolidModel,
+};
+
+impl SceneModel {
+    /// The scene in full: a valid scene in its JSON form.
+    ///
+    /// Defaults are written out, points from files are inlined, profiles are ordered by name.
+    /// What has no value (a band, explicit bounds, a chosen zero-angle direction) is left out.
+    pub fn resolve(&self) -> Value {
+        let materials = self
+            .materials
+            .iter()
+            .map(|(id, name)| (id.to_string(), json!(name)));
+        let profiles = self
+            .profiles
+            .iter()
+            .map(|(name, model)| (name.clone(), profile(model)));
+        object([
+            ("schema", json!(1)),
+            ("name", json!(self.name)),
+            ("units", json!(self.units.name())),
+            ("grid", grid(&self.grid)),
+            ("output", output(&self.output)),
+            ("materials", sorted(materials)),
+            ("profiles", sorted(profiles)),
+            (
+                "solid",
+                self.solids.iter().map(|model| self.solid(model)).collect(),
+            ),
+        ])
+    }
+
+    fn solid(&self, model: &SolidModel) -> Value {
+        let SolidKind::Revolve {
+            profile,
+            angle,
+            start,
+            axis,
+        } = &model.kind;
+        object([
+            ("name", json!(model.name)),
+            ("kind", json!("revolve")),
+            ("profile", json!(self.profiles[*profile].0)),
+            ("angle", json!(angle)),
+            ("start", json!(start)),
+            ("axis", self::axis(axis)),
+            ("place", model.steps.iter().map(step).collect()),
+            ("operation", json!(model.operation.name())),
+            ("material", json!(model.material)),
+        ])
+    }
+}
+
+/// An object whose keys are in alphabetical order, whichever map `serde_json` was built with.
+fn sorted(entries: impl IntoIterator<Item = (String, Value)>) -> Value {
+    let mut entries: Vec<_> = entries.into_iter().collect();
+    entries.sort_by(|a, b| a.0.cmp(&b.0));
+    Value::Object(Map::from_iter(entries))
+}
+
+/// As [`sorted`]; entries that are `null` are left out.
+fn object<const N: usize>(entries: [(&str, Value); N]) -> Value {
+    sorted(
+        entries
+            .into_iter()
+            .filter(|(_, value)| !value.is_null())
+            .map(|(key, value)| (key.to_owned(), value)),
+    )
+}
+
+fn grid(model: &GridModel) -> Value {
+    let (resolution, spacing, origin, dims) = match model.step {
+        GridStep::Resolution(n) => (json!(n), Value::Null, Value::Null, Value::Null),
+        GridStep::Resolutions(n) => (json!(n), Value::Null, Value::Null, Value::Null),
+        GridStep::Spacing(spacing) => (Value::Null, json!(spacing), Value::Null, Value::Null),
+        GridStep::Verbatim {
+            origin,
+            spacing,
+            dims,
+        } => (Value::Null, json!(spacing), json!(origin), json!(dims)),
+    };
+    object([
+        ("resolution", resolution),
+        ("spacing", spacing),
+        ("bounds", json!(model.bounds)),
+        ("origin", origin),
+        ("dims", dims),
+        ("padding", json!(model.padding)),
+    ])
+}
+
+fn output(model: &OutputModel) -> Value {
+    object([
+        (
+            "channels",
+            model.channels.iter().map(|name| name.name()).collect(),
+        ),
+        (
+            "formats",
+            model.formats.iter().map(|name| name.name()).collect(),
+        ),
+        ("compression", json!(model.compression.name())),
+        ("band", json!(model.band)),
+    ])
+}
+
+fn profile(model: &ProfileModel) -> Value {
+    let chain = |curves: &Vec<CurveModel>| curves.iter().map(curve).collect::<Value>();
+    let loops = match model.loops.as_slice() {
+        [] => Value::Null,
+        loops => loops.iter().map(chain).collect(),
+    };
+    object([
+        ("boundary", json!(model.boundary.name())),
+        ("fill", json!(model.fill.name())),
+        ("curves", model.curves.as_ref().map_or(Value::Null, chain)),
+        ("loops", loops),
+    ])
+}
+
+fn curve(model: &CurveModel) -> Value {
+    let points = |points: &[PointModel]| -> Value {
+        points
+            .iter()
+            .map(|point| json!([point.r, point.z]))
+            .collect()
+    };
+    let reverse = ("reverse", json!(model.reverse));
+    match &model.kind {
+        CurveKind::Nurbs {
+            degree,
+            points: p,
+            weights,
+            knots,
+        } => object([
+            ("kind", json!("nurbs")),
+            reverse,
+            ("degree", json!(degree)),
+            ("points", points(p)),
+            ("weights", json!(weights)),
+            ("knots", json!(knots)),
+        ]),
+        CurveKind::Bezier { points: p, weights } => object([
+            ("kind", json!("bezier")),
+            reverse,
+            ("points", points(p)),
+            ("weights", json!(weights)),
+        ]),
+        CurveKind::Polyline { points: p } => {
+            object([("kind", json!("polyline")), reverse, ("points", points(p))])
+        }
+        CurveKind::Arc {
+            center,
+            radius,
+            from,
+            to,
+        } => object([
+            ("kind", json!("arc")),
+            reverse,
+            ("center", json!(center)),
+            ("radius", json!(radius)),
+            ("from", json!(from)),
+            ("to", json!(to)),
+        ]),
+        CurveKind::Circle { center, radius } => object([
+            ("kind", json!("circle")),
+            reverse,
+            ("center", json!(center)),
+            ("radius", json!(radius)),
+        ]),
+        CurveKind::Ellipse {
+            center,
+            radii,
+            tilt,
+        } => object([
+            ("kind", json!("ellipse")),
+            reverse,
+            ("center", json!(center)),
+            ("radii", json!(radii)),
+            ("tilt", json!(tilt)),
+        ]),
+        CurveKind::Interpolate { points: p, degree } => object([
+            ("kind", json!("interpolate")),
+            reverse,
+            ("points", points(p)),
+            ("degree", json!(degree)),
+        ]),
+    }
+}
+
+fn axis(model: &AxisModel) -> Value {
+    object([
+        ("origin", json!(model.origin)),
+        ("direction", json!(model.direction)),
+        ("x", json!(model.x)),
+    ])
+}
+
+fn step(step: &PlaceStep) -> Value {
+    match step {
+        PlaceStep::Scale(factor) => object([("scale", json!(factor))]),
+        PlaceStep::Rotate { axis, degrees } => object([(
+            "rotate",
+            object([("axis", json!(axis)), ("degrees", json!(degrees))]),
+        )]),
+        PlaceStep::Translate(by) => object([("translate", json!(by))]),
+    }
+}

@@ -1,0 +1,644 @@
+//! The JSON Schema of scene files, for editors.
+//!
+//! It says all that a schema can: keys, types, names and ranges. What relates one value to another
+//! (counts, knots, names of profiles) is left to the reader.
+
+use serde_json::{Map, Value, json};
+
+use super::limits::{MAX_DEGREE, MAX_MAGNITUDE, MAX_NAME, MAX_VOXELS, MIN_MAGNITUDE};
+use super::model::{Boundary, ChannelName, CompressionName, Fill, FormatName, Operation, Units};
+use super::read::{DEFAULT_PADDING, DEFAULT_RESOLUTION};
+
+/// JSON Schema (draft 2020-12) of the scene file.
+pub fn json_schema() -> Value {
+    let mut root = object(
+        "A scene: solids of revolution and the voxel grid they are sampled on.",
+        &["schema", "solid"],
+        [
+            (
+                "schema",
+                json!({ "const": 1, "description": "Version of the scene format." }),
+            ),
+            (
+                "name",
+                name("Name of the scene; by default the file's name without its extension."),
+            ),
+            (
+                "units",
+                with_default(
+                    names(
+                        "What one unit of length is. A label: nothing is rescaled.",
+                        Units::ALL.iter().map(|n| n.name()),
+                    ),
+                    json!("m"),
+                ),
+            ),
+            ("grid", grid()),
+            ("output", output()),
+            (
+                "materials",
+                json!({
+                    "description": "Names of material ids.",
+                    "type": "object",
+                    "patternProperties": { "^[1-9][0-9]{0,9}$": name("Name of the material.") },
+                    "additionalProperties": false,
+                }),
+            ),
+            (
+                "profiles",
+                json!({
+                    "description": "Regions of the meridian half-plane by name.",
+                    "type": "object",
+                    "additionalProperties": profile(),
+                    "propertyNames": { "minLength": 1, "maxLength": MAX_NAME },
+                }),
+            ),
+            (
+                "solid",
+                array(
+                    "Solids, in the order in which they combine.",
+                    1,
+                    json!({ "$ref": "#/$defs/solid" }),
+                ),
+            ),
+        ],
+    );
+    root["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    root["title"] = json!("voxlathe scene");
+    root["$defs"] = json!({
+        "solid": solid(),
+        "curve": {
+            "description": "A curve of a profile; its kind decides its keys.",
+            "oneOf": curve_kinds(),
+        },
+    });
+    root
+}
+
+fn object<const N: usize>(
+    description: &str,
+    required: &[&str],
+    properties: [(&str, Value); N],
+) -> Value {
+    let properties: Map<String, Value> = properties
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect();
+    json!({
+        "description": description,
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false,
+    })
+}
+
+fn with_default(mut schema: Value, default: Value) -> Value {
+    schema["default"] = default;
+    schema
+}
+
+fn names(description: &str, names: impl Iterator<Item = &'static str>) -> Value {
+    json!({ "description": description, "enum": names.collect::<Vec<_>>() })
+}
+
+fn name(description: &str) -> Value {
+    json!({
+        "description": description,
+        "type": "string",
+        "minLength": 1,
+        "maxLength": MAX_NAME,
+    })
+}
+
+fn number(description: &str) -> Value {
+    json!({
+        "description": description,
+        "type": "number",
+        "minimum": -MAX_MAGNITUDE,
+        "maximum": MAX_MAGNITUDE,
+    })
+}
+
+fn length(description: &str) -> Value {
+    json!({
+        "description": description,
+        "type": "number",
+        "minimum": MIN_MAGNITUDE,
+        "maximum": MAX_MAGNITUDE,
+    })
+}
+
+fn positive(description: &str) -> Value {
+    json!({
+        "description": description,
+        "type": "number",
+        "exclusiveMinimum": 0,
+        "maximum": MAX_MAGNITUDE,
+    })
+}
+
+fn integer(description: &str, low: u32, high: u32) -> Value {
+    json!({ "description": description, "type": "integer", "minimum": low, "maximum": high })
+}
+
+fn array(description: &str, least: usize, items: Value) -> Value {
+    json!({ "description": description, "type": "array", "minItems": least, "items": items })
+}
+
+fn tuple(description: &str, count: usize, item: Value) -> Value {
+    json!({
+        "description": description,
+        "type": "array",
+        "minItems": count,
+        "maxItems": count,
+        "items": item,
+    })
+}
+
+fn vector(description: &str) -> Value {
+    tuple(description, 3, number("A coordinate."))
+}
+
+fn point(description: &str) -> Value {
+    tuple(description, 2, number("A coordinate."))
+}
+
+fn choice(description: &str, options: Value) -> Value {
+    json!({ "description": description, "oneOf": options })
+}
+
+fn grid() -> Value {
+    let voxels = || integer("A number of voxels.", 1, MAX_VOXELS);
+    object(
+        "Where the voxels are: resolution, or spacing, or origin with spacing and dims.",
+        &[],
+        [
+            (
+                "resolution",
+                with_default(
+                    choice(
+                        "Voxels along the longest side of the bounds, before padding, or along each side.",
+                        json!([voxels(), tuple("[nx, ny, nz]", 3, voxels())]),
+                    ),
+                    json!(DEFAULT_RESOLUTION),
+                ),
+            ),
+            (
+                "spacing",
+                choice(
+                    "Size of a voxel, or along each axis. Not together with resolution.",
+                    json!([
+                        length("The same along all axes."),
+                        tuple("[dx, dy, dz]", 3, length("Along one axis.")),
+                    ]),
+                ),
+            ),
+            (
+                "bounds",
+                tuple(
+                    "The box to fill, minimum and maximum corner; by default the bounds of the added solids.",
+                    2,
+                    vector("A corner."),
+                ),
+            ),
+            (
+                "origin",
+                vector(
+                    "Minimum corner of the first voxel; with spacing and dims the grid verbatim.",
+                ),
+            ),
+            ("dims", tuple("Number of voxels [nx, ny, nz].", 3, voxels())),
+            (
+                "padding",
+                with_default(
+                    integer(
+                        "Voxels added on every side; never to explicit bounds or a verbatim grid.",
+                        0,
+                        MAX_VOXELS,
+                    ),
+                    json!(DEFAULT_PADDING),
+                ),
+            ),
+        ],
+    )
+}
+
+fn output() -> Value {
+    let several = |description: &str, item: Value| {
+        let mut list = array(description, 1, item);
+        list["uniqueItems"] = json!(true);
+        list
+    };
+    object(
+        "What is written; flags of the command override it.",
+        &[],
+        [
+            (
+                "channels",
+                with_default(
+                    several(
+                        "What is sampled.",
+                        names("A channel.", ChannelName::ALL.iter().map(|n| n.name())),
+                    ),
+                    json!(["occupancy", "fraction", "sdf"]),
+                ),
+            ),
+            (
+                "formats",
+                with_default(
+                    several(
+                        "Files to write.",
+                        names("A file format.", FormatName::ALL.iter().map(|n| n.name())),
+                    ),
+                    json!(["exr"]),
+                ),
+            ),
+            (
+                "compression",
+                with_default(
+                    names(
+                        "Compression of the files; pxr24 is lossy, auto is lossless and chosen for write speed.",
+                        CompressionName::ALL.iter().map(|n| n.name()),
+                    ),
+                    json!("auto"),
+                ),
+            ),
+            (
+                "band",
+                positive(
+                    "Clamp the signed distance to this many voxels of the largest spacing; by default it is not clamped.",
+                ),
+            ),
+        ],
+    )
+}
+
+fn profile() -> Value {
+    let curves = |description: &str| array(description, 1, json!({ "$ref": "#/$defs/curve" }));
+    object(
+        "A region of the meridian half-plane, in coordinates (r, z) with r >= 0.",
+        &[],
+        [
+            (
+                "boundary",
+                with_default(
+                    names(
+                        "closed: the curves form closed loops; to-axis: one open chain whose ends are joined to the axis.",
+                        Boundary::ALL.iter().map(|n| n.name()),
+                    ),
+                    json!("closed"),
+                ),
+            ),
+            (
+                "fill",
+                with_default(
+                    names(
+                        "How several loops combine.",
+                        Fill::ALL.iter().map(|n| n.name()),
+                    ),
+                    json!("even-odd"),
+                ),
+            ),
+            (
+                "curves",
+                curves("Curves in order, head to tail: the loop, or the open chain."),
+            ),
+            (
+                "loops",
+                array(
+                    "Several closed loops: instead of curves, or with to-axis beside them.",
+                    1,
+                    curves("Curves in order, head to tail."),
+                ),
+            ),
+        ],
+    )
+}
+
+fn curve_kinds() -> Value {
+    let kind = |name: &str| {
+        (
+            "kind",
+            json!({ "const": name, "description": "Kind of curve." }),
+        )
+    };
+    let reverse = || {
+        (
+            "reverse",
+            json!({
+                "description": "Run through the curve backwards.",
+                "type": "boolean",
+                "default": false,
+            }),
+        )
+    };
+    let points = || {
+        (
+            "points",
+            choice(
+                "Points [r, z], or a file of them.",
+                json!([
+                    array("Points.", 2, point("A point [r, z].")),
+                    object(
+                        "A file with r, z and optionally the weight on a line; # starts a comment.",
+                        &["file"],
+                        [(
+                            "file",
+                            json!({
+                                "description": "Path relative to the scene.",
+                                "type": "string",
+                                "minLength": 1,
+                            }),
+                        )],
+                    ),
+                ]),
+            ),
+        )
+    };
+    let weights = || {
+        (
+            "weights",
+            array(
+                "A weight for each point; by default all 1.",
+                2,
+                positive("A weight."),
+            ),
+        )
+    };
+    #[allow(clippy::cast_possible_truncation, reason = "32")]
+    let degree = || integer("Degree, below the number of points.", 1, MAX_DEGREE as u32);
+    let center = || ("center", point("Centre [r, z]."));
+    let radius = || ("radius", length("Radius."));
+    let mut bezier_points = points().1;
+    bezier_points["oneOf"][0]["maxItems"] = json!(MAX_DEGREE + 1);
+    json!([
+        object(
+            "A rational B-spline.",
+            &["kind", "degree", "points"],
+            [
+                kind("nurbs"),
+                reverse(),
+                ("degree", degree()),
+                points(),
+                weights(),
+                (
+                    "knots",
+                    array(
+                        "Points + degree + 1 knots, not decreasing; by default clamped and uniform on [0, 1].",
+                        4,
+                        number("A knot."),
+                    ),
+                ),
+            ],
+        ),
+        object(
+            "A rational Bézier curve, its degree one less than the points.",
+            &["kind", "points"],
+            [
+                kind("bezier"),
+                reverse(),
+                ("points", bezier_points),
+                weights()
+            ],
+        ),
+        object(
+            "Straight segments.",
+            &["kind", "points"],
+            [kind("polyline"), reverse(), points()],
+        ),
+        object(
+            "A circular arc; from > to runs clockwise.",
+            &["kind", "center", "radius", "from", "to"],
+            [
+                kind("arc"),
+                reverse(),
+                center(),
+                radius(),
+                (
+                    "from",
+                    number("Angle of the start in degrees, from +r towards +z."),
+                ),
+                (
+                    "to",
+                    number("Angle of the end in degrees, within 360 of from.")
+                ),
+            ],
+        ),
+        object(
+            "A full circle, counter-clockwise.",
+            &["kind", "center", "radius"],
+            [kind("circle"), reverse(), center(), radius()],
+        ),
+        object(
+            "A full ellipse, counter-clockwise.",
+            &["kind", "center", "radii"],
+            [
+                kind("ellipse"),
+                reverse(),
+                center(),
+                (
+                    "radii",
+                    tuple("Half axes along r and z.", 2, length("A half axis."))
+                ),
+                (
+                    "tilt",
+                    with_default(
+                        number("Turn about the centre in degrees, counter-clockwise."),
+                        json!(0),
+                    ),
+                ),
+            ],
+        ),
+        object(
+            "The clamped spline through the points.",
+            &["kind", "points"],
+            [
+                kind("interpolate"),
+                reverse(),
+                points(),
+                ("degree", with_default(degree(), json!(3))),
+            ],
+        ),
+    ])
+}
+
+fn solid() -> Value {
+    let step = |key: &str, value: Value| object("One step.", &[key], [(key, value)]);
+    let rotate = object(
+        "Turn about an axis through the origin.",
+        &["axis", "degrees"],
+        [
+            ("axis", vector("Direction, not zero.")),
+            (
+                "degrees",
+                number("Angle, counter-clockwise seen from the tip of the axis."),
+            ),
+        ],
+    );
+    object(
+        "A solid: a profile turned about an axis.",
+        &["kind", "profile"],
+        [
+            (
+                "name",
+                name("Name, unique in the scene; by default kind and number."),
+            ),
+            (
+                "kind",
+                json!({ "const": "revolve", "description": "Kind of solid." }),
+            ),
+            (
+                "profile",
+                json!({ "description": "Name of the profile.", "type": "string" }),
+            ),
+            (
+                "angle",
+                json!({
+                    "description": "Degrees turned; flat caps close a partial turn.",
+                    "type": "number",
+                    "minimum": MIN_MAGNITUDE,
+                    "maximum": 360,
+                    "default": 360,
+                }),
+            ),
+            (
+                "start",
+                with_default(number("Degrees where the turn starts."), json!(0)),
+            ),
+            (
+                "axis",
+                object(
+                    "The axis of revolution.",
+                    &[],
+                    [
+                        (
+                            "origin",
+                            with_default(
+                                vector("A point of the axis, height 0."),
+                                json!([0, 0, 0]),
+                            ),
+                        ),
+                        (
+                            "direction",
+                            with_default(vector("Direction, not zero."), json!([0, 0, 1])),
+                        ),
+                        (
+                            "x",
+                            vector(
+                                "Zero-angle direction, not parallel to the axis; by default +x, or +y where the axis is near x.",
+                            ),
+                        ),
+                    ],
+                ),
+            ),
+            (
+                "place",
+                with_default(
+                    array(
+                        "Steps that place the solid, first to last.",
+                        0,
+                        choice(
+                            "One step.",
+                            json!([
+                                step("scale", length("Scale about the origin.")),
+                                step("rotate", rotate),
+                                step("translate", vector("Move by this vector.")),
+                            ]),
+                        ),
+                    ),
+                    json!([]),
+                ),
+            ),
+            (
+                "operation",
+                with_default(
+                    names(
+                        "What it does to what the solids before it have made; the first can only add.",
+                        Operation::ALL.iter().map(|n| n.name()),
+                    ),
+                    json!("add"),
+                ),
+            ),
+            (
+                "material",
+                with_default(integer("Material id.", 1, u32::MAX), json!(1)),
+            ),
+        ],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::super::keys;
+    use super::*;
+
+    fn properties(schema: &Value) -> BTreeSet<&str> {
+        assert_eq!(schema["additionalProperties"], json!(false));
+        let properties = schema["properties"].as_object().expect("an object");
+        properties.keys().map(String::as_str).collect()
+    }
+
+    fn check(schema: &Value, keys: &[&str]) {
+        assert_eq!(properties(schema), keys.iter().copied().collect());
+        for required in schema["required"].as_array().expect("an array") {
+            assert!(keys.contains(&required.as_str().expect("a key")));
+        }
+    }
+
+    #[test]
+    fn the_schema_has_the_keys_of_the_reader() {
+        let schema = json_schema();
+        check(&schema, keys::SCENE);
+        check(&schema["properties"]["grid"], keys::GRID);
+        check(&schema["properties"]["output"], keys::OUTPUT);
+        let profile = &schema["properties"]["profiles"]["additionalProperties"];
+        check(profile, keys::PROFILE);
+        let curves = schema["$defs"]["curve"]["oneOf"].as_array().expect("kinds");
+        assert_eq!(curves.len(), keys::CURVES.len());
+        for (curve, (kind, keys)) in curves.iter().zip(keys::CURVES) {
+            assert_eq!(curve["properties"]["kind"]["const"], json!(kind));
+            check(curve, keys);
+        }
+        check(
+            &curves[0]["properties"]["points"]["oneOf"][1],
+            keys::POINTS_FILE,
+        );
+        let solid = &schema["$defs"]["solid"];
+        assert_eq!(keys::SOLIDS.len(), 1);
+        assert_eq!(
+            solid["properties"]["kind"]["const"],
+            json!(keys::SOLIDS[0].0)
+        );
+        check(solid, keys::SOLIDS[0].1);
+        check(&solid["properties"]["axis"], keys::AXIS);
+        let steps = solid["properties"]["place"]["items"]["oneOf"]
+            .as_array()
+            .expect("steps");
+        let all: BTreeSet<&str> = steps.iter().flat_map(properties).collect();
+        assert_eq!(all, keys::STEP.iter().copied().collect());
+        check(&steps[1]["properties"]["rotate"], keys::ROTATE);
+    }
+
+    #[test]
+    fn every_key_is_described() {
+        fn walk(schema: &Value, path: &str) {
+            match schema {
+                Value::Object(map) => {
+                    if let Some(Value::Object(properties)) = map.get("properties") {
+                        for (key, property) in properties {
+                            assert!(property["description"].is_string(), "{path}.{key}");
+                        }
+                    }
+                    map.iter()
+                        .for_each(|(key, value)| walk(value, &format!("{path}.{key}")));
+                }
+                Value::Array(list) => list.iter().for_each(|value| walk(value, path)),
+                _ => {}
+            }
+        }
+        walk(&json_schema(), "");
+    }
+}
