@@ -40,10 +40,13 @@ pub const SIGN_CONVENTION: &str = "negative-inside";
 /// The largest side of an image: OpenEXR's windows are signed 32-bit and readers want headroom.
 const MAX_SIDE: usize = (i32::MAX / 2) as usize;
 
-/// No compression of the format shrinks by more than this: deflate reaches 1032, Huffman-coded
-/// runs of PIZ about 500. An image that promises more than this many bytes for each byte of its file is refused
-/// before anything is allocated for it.
-const MAX_EXPANSION: u64 = 4096;
+/// No compression here shrinks by more than this: deflate reaches 1032, after the 24-bit rounding of
+/// `pxr24` 4/3 of that, runs in PIZ's Huffman code about 500. An image that promises more bytes for
+/// each byte of its file is refused before anything is allocated for it.
+const MAX_EXPANSION: u64 = 2048;
+
+/// Samples reserved at once when decoding; more come as the file delivers them.
+const MAX_RESERVED: usize = 1 << 20;
 
 /// Why a layer cannot be encoded or decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -765,7 +768,8 @@ pub fn decode_layer(bytes: &[u8]) -> Result<DecodedLayer, ExrError> {
         .list
         .iter()
         .map(|c| {
-            let samples = DecodedSamples::with_capacity(c.sample_type, width * height);
+            let n = width.saturating_mul(height).min(MAX_RESERVED);
+            let samples = DecodedSamples::with_capacity(c.sample_type, n);
             (c.name.to_string(), samples)
         })
         .collect();
@@ -943,6 +947,33 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn constant_layers_come_back_however_small_the_file() {
+        let zeros = vec![0.0_f32; 1024 * 1024];
+        let list = [("fraction", Samples::Float(&zeros))];
+        for compression in Compression::ALL {
+            let bytes = encode_layer([1024, 1024], &list, &Attributes::new(), compression).unwrap();
+            let found = decode_layer(&bytes).unwrap();
+            assert!(found.channel("fraction") == Some(&DecodedSamples::Float(zeros.clone())));
+        }
+    }
+
+    #[test]
+    fn a_header_alone_cannot_claim_memory() {
+        let list = [("sdf", Samples::Float(&[0.0]))];
+        let mut bytes = encode_layer([1, 1], &list, &Attributes::new(), Compression::None).unwrap();
+        let name = b"dataWindow\0box2i\0";
+        let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4;
+        bytes[at + 8..at + 12].copy_from_slice(&1_000_000_000_i32.to_le_bytes());
+        let error = decode_layer(&bytes).unwrap_err().to_string();
+        assert!(
+            error.starts_with("not an intact OpenEXR file (1000000001 x 1 voxels"),
+            "{error}"
+        );
+        bytes[at + 12..at + 16].copy_from_slice(&1_000_000_000_i32.to_le_bytes());
+        assert!(decode_layer(&bytes).is_err());
     }
 
     #[test]

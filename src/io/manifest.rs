@@ -197,6 +197,7 @@ impl Manifest {
             finite("range", &channel.range.unwrap_or_default())?;
         }
         let mut names = BTreeSet::new();
+        let mut slices = BTreeSet::new();
         for file in &self.files {
             check_file_name(&file.name)
                 .map_err(|reason| format!("the file name {:?} {reason}", file.name))?;
@@ -211,9 +212,18 @@ impl Manifest {
                     file.name
                 ));
             }
-            if file.slice.is_some_and(|k| k >= self.grid.dims[2]) {
-                return Err(format!("the slice of {:?} is outside the grid", file.name));
+            if let Some(k) = file.slice {
+                if k >= self.grid.dims[2] {
+                    return Err(format!("the slice of {:?} is outside the grid", file.name));
+                }
+                if !slices.insert(k) {
+                    return Err(format!("slice {k} is listed twice"));
+                }
             }
+        }
+        if !slices.is_empty() && slices.len() < self.grid.dims[2] {
+            let (listed, layers) = (slices.len(), self.grid.dims[2]);
+            return Err(format!("it lists {listed} slices of {layers}"));
         }
         Ok(())
     }
@@ -439,6 +449,10 @@ pub(super) mod tests {
         );
         assert!(refused("\"units\"", "\"unit\"").contains("unknown field `unit`"));
         assert!(refused("\"slice\": 0", "\"slice\": 1").contains("outside the grid"));
+        assert_eq!(
+            refused("13,\n      1\n", "13,\n      2\n"),
+            "it lists 1 slices of 2"
+        );
         assert!(refused("\"dims\": [\n      7", "\"dims\": [\n      0").contains("dimension x"));
         for end in 0..good.len() - 2 {
             assert!(Manifest::from_bytes(&good.as_bytes()[..end]).is_err());

@@ -142,12 +142,13 @@ fn read_csv(path: &Path, mut reader: impl BufRead) -> Result<Vec<DVec3>, IoError
             continue;
         }
         // Three names are a header; a number with a slip among numbers is not.
-        let is_header = header_allowed
-            && fields.iter().all(|(_, field)| {
-                !field.is_empty()
-                    && field.parse::<f64>().is_err()
-                    && !field.starts_with(|c: char| c.is_ascii_digit())
-            });
+        let is_name = |field: &str| {
+            !field.is_empty()
+                && field.parse::<f64>().is_err()
+                && !field.starts_with(|c: char| c.is_ascii_digit())
+        };
+        let is_header =
+            header_allowed && fields.len() == 3 && fields.iter().all(|(_, field)| is_name(field));
         header_allowed = false;
         if is_header {
             continue;
@@ -498,6 +499,7 @@ mod tests {
                 "1.0,2.o,3\n",
                 "p.csv:1:5: a number is wanted, found \"2.o\"",
             ),
+            ("hello\n", "p.csv:1:1: a number is wanted, found \"hello\""),
             ("1;2;3\n", "p.csv:1:1: a number is wanted, found \"1;2;3\""),
             (
                 "\u{e9} 1 2\n",

@@ -350,6 +350,24 @@ impl StackWriter {
     }
 }
 
+/// Bytes that a stack of these channels takes at most, to compare with
+/// [`available_bytes`](super::directory::available_bytes) before any work.
+///
+/// No slice is larger than its samples with the offsets and sizes of its lines and its header.
+#[must_use]
+pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    const HEADER_AND_RECORD: u64 = 4096;
+    let [nx, ny, nz] = grid.dims().map(|d| d as u64);
+    let pixel: u64 = channels.iter().map(|c| c.kind.bytes() as u64).sum();
+    // Each line has an offset of 8 bytes, its row and its size of 4 bytes each.
+    let slice = nx
+        .saturating_mul(pixel)
+        .saturating_add(16)
+        .saturating_mul(ny)
+        .saturating_add(HEADER_AND_RECORD);
+    slice.saturating_mul(nz).saturating_add(HEADER_AND_RECORD)
+}
+
 fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {
     if channels.is_empty() {
         return Err(ExrError::NoChannels);
@@ -402,10 +420,10 @@ impl Statistics {
         let place = |n: usize| format!("voxel ({}, {})", n % width.max(1), n / width.max(1));
         match samples {
             Samples::Half(values) => {
-                for &value in *values {
-                    found.include(f64::from(value));
-                    found.count += u64::from(value);
+                if let (Some(&min), Some(&max)) = (values.iter().min(), values.iter().max()) {
+                    found.include(f64::from(min), f64::from(max));
                 }
+                found.count = values.iter().map(|&v| u64::from(v)).sum();
                 if name == "occupancy"
                     && let Some(n) = values.iter().position(|&v| v > 1)
                 {
@@ -417,23 +435,31 @@ impl Statistics {
                 }
             }
             Samples::Uint(values) => {
-                for &value in *values {
-                    found.include(f64::from(value));
+                if let (Some(&min), Some(&max)) = (values.iter().min(), values.iter().max()) {
+                    found.include(f64::from(min), f64::from(max));
                 }
             }
             Samples::Float(values) => {
-                for (n, &value) in values.iter().enumerate() {
-                    if value.is_finite() {
-                        found.include(f64::from(value));
-                    } else if value.is_nan() {
+                // Comparisons without branches, so that the compiler uses its lanes.
+                let (mut min, mut max, mut all_finite) = (f32::INFINITY, f32::NEG_INFINITY, true);
+                for &value in *values {
+                    all_finite &= value.is_finite();
+                    min = if value < min { value } else { min };
+                    max = if value > max { value } else { max };
+                }
+                if !all_finite {
+                    if let Some(n) = values.iter().position(|v| v.is_nan()) {
                         return Err(format!(
                             "{name} of {} is NaN; every sample must be a number",
                             place(n)
                         ));
-                    } else {
-                        found.infinite += 1;
                     }
+                    let finite = || values.iter().copied().filter(|v| v.is_finite());
+                    found.infinite = (values.len() - finite().count()) as u64;
+                    min = finite().fold(f32::INFINITY, f32::min);
+                    max = finite().fold(f32::NEG_INFINITY, f32::max);
                 }
+                found.include(f64::from(min), f64::from(max));
                 if name == "fraction" {
                     if let Some(n) = values.iter().position(|v| !(0.0..=1.0).contains(v)) {
                         return Err(format!(
@@ -449,9 +475,9 @@ impl Statistics {
         Ok(found)
     }
 
-    fn include(&mut self, value: f64) {
-        self.min = self.min.min(value);
-        self.max = self.max.max(value);
+    fn include(&mut self, min: f64, max: f64) {
+        self.min = self.min.min(min);
+        self.max = self.max.max(max);
     }
 
     /// Of several layers, in their order.
@@ -683,6 +709,11 @@ pub(super) mod tests {
         let manifest = write_ramp(dir.path(), 2, false);
         assert_eq!(Manifest::load(dir.path()).unwrap(), manifest);
         assert_eq!(manifest.compression, "none");
+        let bytes: u64 = fs::read_dir(dir.path())
+            .unwrap()
+            .map(|e| e.unwrap().metadata().unwrap().len())
+            .sum();
+        assert!(bytes <= largest_stack_bytes(&grid(), &specs()));
         assert_eq!(manifest.grid.dims, DIMS);
         let all: Vec<_> = (0..DIMS[2]).map(layer_values).collect();
         let inside: usize = all.iter().flat_map(|l| &l.0).filter(|&&v| v == 1).count();
