@@ -1,0 +1,29 @@
+//! Files: the EXR stack with its manifest, and the points of a query.
+//!
+//! ```text
+//!   layers ──> exr (bytes of one slice) ──> directory (staged, synced)
+//!                                               │ commit: renames, the manifest last
+//!                                               v
+//!   DIR/slice-0000.exr  DIR/slice-0001.exr  ...  DIR/manifest.json
+//! ```
+//!
+//! [`stack`] is the whole path in one type, [`verify`] the way back, [`points`] the tables that
+//! `query` reads and writes. Nothing here knows geometry or scenes, only grids and bytes.
+//!
+//! Equal input gives equal bytes: no times, no random names, no map order reaches a file. A file
+//! appears under its final name only when it is whole and synced.
+
+pub mod directory;
+mod error;
+pub mod exr;
+pub mod manifest;
+pub mod points;
+pub mod stack;
+pub mod verify;
+
+pub use directory::{StackDirectory, available_bytes, write_file_atomically};
+pub use error::{IoError, IoErrorKind};
+pub use manifest::Manifest;
+pub use points::{read_points, write_columns};
+pub use stack::{StackWriter, write_stack};
+pub use verify::{StackReport, verify_stack};

@@ -1,0 +1,888 @@
+//! Writing a whole stack: one slice for each z layer, in any order, then the manifest.
+//!
+//! ```
+//! # use glam::DVec3;
+//! # use voxlathe::grid::{GridSpec, Volume};
+//! # let dir = tempfile::tempdir()?;
+//! # let out = dir.path().join("out");
+//! let grid = GridSpec::new([2, 3, 5], DVec3::ZERO, DVec3::ONE)?;
+//! let sdf = Volume::new(grid, vec![0.5_f32; 30]);
+//! let manifest = voxlathe::io::exr::write_stack(&out, &grid, &[("sdf", &sdf)])?;
+//! assert_eq!(manifest.files[4].name, "slice-0004.exr");
+//! assert_eq!(manifest.channels[0].range, Some([0.5, 0.5]));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Sums and ranges are kept layer by layer and joined in the order of the layers, so they do not
+//! depend on which thread wrote what when.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use rayon::prelude::*;
+
+use super::directory::{StackDirectory, WrittenFile};
+use super::error::IoError;
+use super::exr::{
+    Compression, ExrError, LayerChannels, SIGN_CONVENTION, SampleKind, Samples, check_channel_name,
+    encode_layer, layer_attributes,
+};
+use super::manifest::{
+    ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, SCHEMA, slice_name,
+};
+use crate::grid::{GridSpec, Volume};
+
+/// A channel that each layer of a stack has.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelSpec {
+    /// Name in the files: printable ASCII without blanks.
+    pub name: String,
+    /// Type of its samples.
+    pub kind: SampleKind,
+    /// What a sample says.
+    pub meaning: String,
+    /// Unit of the samples, where they have one.
+    pub unit: Option<String>,
+}
+
+impl ChannelSpec {
+    /// The channel of this name, with the meaning that the known ones have.
+    ///
+    /// * `units`: label of the scene's lengths, the unit of `sdf`.
+    #[must_use]
+    pub fn named(name: &str, kind: SampleKind, units: &str) -> Self {
+        let meaning = match name {
+            "occupancy" => "1 where the voxel centre is inside the solid or on its surface, else 0",
+            "fraction" => "part of the voxel's volume that is inside the solid",
+            "sdf" => "distance from the voxel centre to the surface, negative inside",
+            "material" => "id of the material at the voxel centre, 0 where empty",
+            _ => "values given by the caller",
+        };
+        Self {
+            name: name.into(),
+            kind,
+            meaning: meaning.into(),
+            unit: (name == "sdf").then(|| units.into()),
+        }
+    }
+}
+
+/// How a stack is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StackOptions {
+    /// Label of the unit of lengths; `m` by default.
+    pub units: String,
+    /// Name and BLAKE3 digest of the resolved scene, where there is one.
+    pub scene: Option<SceneLabel>,
+    /// Compression of the slices.
+    pub compression: Compression,
+    /// Whether an old stack in the directory makes way.
+    pub force: bool,
+}
+
+impl Default for StackOptions {
+    fn default() -> Self {
+        Self {
+            units: "m".into(),
+            scene: None,
+            compression: Compression::Auto,
+            force: false,
+        }
+    }
+}
+
+/// The scene that a stack was made from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneLabel {
+    /// Its name.
+    pub name: String,
+    /// BLAKE3 digest of its resolved form, in hexadecimal.
+    pub hash: String,
+}
+
+/// What the manifest says beyond the layers themselves.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StackSummary {
+    /// Minimum and maximum corner of the solid, in scene units.
+    pub bounds: Option<[[f64; 3]; 2]>,
+    /// Voxels whose centre is inside; counted from `occupancy` where that is a channel.
+    pub voxels_inside: Option<u64>,
+    /// Volume of the solid itself, in cubed scene units.
+    pub volume_exact: Option<f64>,
+    /// What is known about each solid.
+    pub solids: serde_json::Value,
+    /// Names of material ids.
+    pub materials: serde_json::Value,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Where the distance is exact and where a lower bound.
+    pub certainty: serde_json::Value,
+    /// The resolved scene.
+    pub scene: serde_json::Value,
+}
+
+/// A stack while it is being written.
+///
+/// Dropping it before [`finish`](Self::finish) leaves no trace of it.
+#[derive(Debug)]
+pub struct StackWriter {
+    directory: StackDirectory,
+    grid: GridSpec,
+    channels: Vec<ChannelSpec>,
+    options: StackOptions,
+    compression: Compression,
+    written: Mutex<Written>,
+}
+
+#[derive(Debug, Default)]
+struct Written {
+    layers: BTreeMap<usize, (FileRecord, Vec<Statistics>)>,
+    others: Vec<FileRecord>,
+}
+
+impl StackWriter {
+    /// A stack of `grid` in the directory `path`, each layer with all of `channels`.
+    ///
+    /// # Errors
+    /// As [`StackDirectory::create`], and [`IoError::Exr`] when a channel cannot be one.
+    pub fn create(
+        path: impl AsRef<Path>,
+        grid: &GridSpec,
+        channels: Vec<ChannelSpec>,
+        options: StackOptions,
+    ) -> Result<Self, IoError> {
+        let path = path.as_ref();
+        check_specs(&channels).map_err(|error| IoError::Exr {
+            path: path.into(),
+            error,
+        })?;
+        Ok(Self {
+            directory: StackDirectory::create(path, options.force)?,
+            grid: *grid,
+            compression: options
+                .compression
+                .resolve(channels.iter().map(|c| c.name.as_str())),
+            channels,
+            options,
+            written: Mutex::default(),
+        })
+    }
+
+    /// The compression of the slices, with `auto` resolved.
+    #[must_use]
+    pub fn compression(&self) -> Compression {
+        self.compression
+    }
+
+    /// Writes layer `k`. Threads may call this at the same time, with the layers in any order.
+    ///
+    /// # Errors
+    /// [`IoError::LayerOutside`], [`IoError::WrittenTwice`], [`IoError::Mismatch`] or
+    /// [`IoError::Exr`] when the layer is not one of the stack's, [`IoError::Write`] when the
+    /// system refuses.
+    pub fn write_layer(&self, k: usize, layer: &LayerChannels<'_>) -> Result<(), IoError> {
+        self.write_samples(k, &layer.list())
+    }
+
+    /// Writes layer `k` from samples by channel name; see [`write_layer`](Self::write_layer).
+    ///
+    /// # Errors
+    /// As [`write_layer`](Self::write_layer).
+    pub fn write_samples(&self, k: usize, layer: &[(&str, Samples<'_>)]) -> Result<(), IoError> {
+        let [nx, ny, layers] = self.grid.dims();
+        if k >= layers {
+            return Err(IoError::LayerOutside {
+                path: self.directory.path().into(),
+                layer: k,
+                layers,
+            });
+        }
+        let name = slice_name(k, layers);
+        let path = self.directory.path().join(&name);
+        let mut statistics = Vec::with_capacity(self.channels.len());
+        for channel in &self.channels {
+            let found = layer.iter().find(|c| c.0 == channel.name).map(|c| c.1);
+            let mismatch = |reason| IoError::Mismatch {
+                path: path.clone(),
+                reason,
+            };
+            let samples = found.filter(|s| s.kind() == channel.kind).ok_or_else(|| {
+                mismatch(format!(
+                    "the layer has no channel {:?} of type {:?}; give each layer every channel of the stack",
+                    channel.name, channel.kind
+                ))
+            })?;
+            statistics.push(Statistics::of(&channel.name, &samples, nx).map_err(mismatch)?);
+        }
+        if layer.len() != self.channels.len() {
+            return Err(IoError::Mismatch {
+                path,
+                reason: format!(
+                    "the layer has {} channels, the stack {}; declare every channel when the stack is created",
+                    layer.len(),
+                    self.channels.len()
+                ),
+            });
+        }
+        let scene = self.options.scene.as_ref();
+        let attributes = layer_attributes(
+            &self.grid,
+            k,
+            &self.options.units,
+            scene.map(|s| (s.name.as_str(), s.hash.as_str())),
+        );
+        let bytes = encode_layer([nx, ny], layer, &attributes, self.compression)
+            .map_err(|error| IoError::Exr { path, error })?;
+        let written = self.directory.write_file(&name, &bytes)?;
+        let z = self.grid.centre_along(2, k);
+        let record = file_record(name, Some((k, z)), written);
+        self.written().layers.insert(k, (record, statistics));
+        Ok(())
+    }
+
+    /// Writes a file beside the slices; the manifest lists it too.
+    ///
+    /// # Errors
+    /// As [`StackDirectory::write_file`].
+    pub fn write_other(&self, name: &str, bytes: &[u8]) -> Result<(), IoError> {
+        let written = self.directory.write_file(name, bytes)?;
+        let record = file_record(name.into(), None, written);
+        self.written().others.push(record);
+        Ok(())
+    }
+
+    /// Makes the stack appear, the manifest last.
+    ///
+    /// # Errors
+    /// [`IoError::LayerMissing`] when a layer was not written, [`IoError::Mismatch`] when a number
+    /// in `summary` is not finite, and as [`StackDirectory::commit`].
+    pub fn finish(self, summary: StackSummary) -> Result<Manifest, IoError> {
+        let path = self.directory.path().to_path_buf();
+        let written = self
+            .written
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        let layers = self.grid.dims()[2];
+        if let Some(layer) = (0..layers).find(|k| !written.layers.contains_key(k)) {
+            return Err(IoError::LayerMissing { path, layer });
+        }
+        let totals: Vec<Statistics> = (0..self.channels.len())
+            .map(|c| Statistics::join(written.layers.values().map(|(_, s)| s[c])))
+            .collect();
+        let total = |name: &str| {
+            let c = self.channels.iter().position(|c| c.name == name)?;
+            Some(totals[c])
+        };
+        let mut warnings = summary.warnings;
+        for (channel, total) in self.channels.iter().zip(&totals) {
+            if total.infinite > 0 {
+                warnings.push(format!(
+                    "{} samples of {} are infinite; its range is that of the others",
+                    total.infinite, channel.name
+                ));
+            }
+        }
+        let voxel = self.grid.voxel_volume();
+        let finite = |v: &f64| v.is_finite();
+        let voxels_inside = total("occupancy")
+            .map(|t| t.count)
+            .or(summary.voxels_inside);
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "a count of 2^53 voxels is out of reach"
+        )]
+        let volume_occupancy = voxels_inside.map(|n| n as f64 * voxel).filter(finite);
+        let volume_fraction = total("fraction").map(|t| t.sum * voxel).filter(finite);
+        let mut files: Vec<FileRecord> = written.layers.into_values().map(|l| l.0).collect();
+        let mut others = written.others;
+        others.sort_by(|a, b| a.name.cmp(&b.name));
+        files.extend(others);
+        let (scene_name, scene_hash) = self
+            .options
+            .scene
+            .map_or((None, None), |s| (Some(s.name), Some(s.hash)));
+        let manifest = Manifest {
+            format: FORMAT.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            schema: SCHEMA,
+            scene_name,
+            scene_hash,
+            units: self.options.units,
+            sign_convention: SIGN_CONVENTION.into(),
+            grid: ManifestGrid::from(&self.grid),
+            bounds: summary.bounds,
+            channels: self
+                .channels
+                .into_iter()
+                .zip(&totals)
+                .map(|(c, t)| ChannelRecord {
+                    name: c.name,
+                    kind: c.kind,
+                    meaning: c.meaning,
+                    unit: c.unit,
+                    range: t.range(),
+                })
+                .collect(),
+            compression: self.compression.name().into(),
+            files,
+            voxels_inside,
+            volume_occupancy,
+            volume_fraction,
+            volume_exact: summary.volume_exact,
+            solids: summary.solids,
+            materials: summary.materials,
+            warnings,
+            certainty: summary.certainty,
+            scene: summary.scene,
+        };
+        let bytes = manifest.to_bytes().map_err(|reason| IoError::Mismatch {
+            path: path.join(MANIFEST_NAME),
+            reason,
+        })?;
+        self.directory.commit(&bytes)?;
+        Ok(manifest)
+    }
+
+    fn written(&self) -> MutexGuard<'_, Written> {
+        // A record is inserted whole or not at all, also when another thread has panicked.
+        self.written.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Bytes that a stack of these channels takes at most, to compare with
+/// [`available_bytes`](super::directory::available_bytes) before any work.
+///
+/// No slice is larger than its samples with the offsets and sizes of its lines and its header.
+#[must_use]
+pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    const HEADER_AND_RECORD: u64 = 4096;
+    let [nx, ny, nz] = grid.dims().map(|d| d as u64);
+    let pixel: u64 = channels.iter().map(|c| c.kind.bytes() as u64).sum();
+    // Each line has an offset of 8 bytes, its row and its size of 4 bytes each.
+    let slice = nx
+        .saturating_mul(pixel)
+        .saturating_add(16)
+        .saturating_mul(ny)
+        .saturating_add(HEADER_AND_RECORD);
+    slice.saturating_mul(nz).saturating_add(HEADER_AND_RECORD)
+}
+
+fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {
+    if channels.is_empty() {
+        return Err(ExrError::NoChannels);
+    }
+    for (n, channel) in channels.iter().enumerate() {
+        check_channel_name(&channel.name)?;
+        if channels[..n].iter().any(|c| c.name == channel.name) {
+            return Err(ExrError::DuplicateChannel {
+                name: channel.name.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn file_record(name: String, layer: Option<(usize, f64)>, written: WrittenFile) -> FileRecord {
+    FileRecord {
+        name,
+        slice: layer.map(|l| l.0),
+        z: layer.map(|l| l.1),
+        bytes: written.bytes,
+        blake3: written.blake3,
+    }
+}
+
+/// Range and sums of a channel in one layer or more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Statistics {
+    min: f64,
+    max: f64,
+    /// Of halves, which are whole numbers.
+    count: u64,
+    /// Of `fraction`.
+    sum: f64,
+    infinite: u64,
+}
+
+impl Statistics {
+    const NONE: Self = Self {
+        min: f64::INFINITY,
+        max: f64::NEG_INFINITY,
+        count: 0,
+        sum: 0.0,
+        infinite: 0,
+    };
+
+    /// Of the samples in rows of `width`; what is wrong when they cannot be that channel's.
+    pub(super) fn of(name: &str, samples: &Samples<'_>, width: usize) -> Result<Self, String> {
+        let mut found = Self::NONE;
+        let place = |n: usize| format!("voxel ({}, {})", n % width.max(1), n / width.max(1));
+        match samples {
+            Samples::Half(values) => {
+                if let (Some(&min), Some(&max)) = (values.iter().min(), values.iter().max()) {
+                    found.include(f64::from(min), f64::from(max));
+                }
+                found.count = values.iter().map(|&v| u64::from(v)).sum();
+                if name == "occupancy"
+                    && let Some(n) = values.iter().position(|&v| v > 1)
+                {
+                    return Err(format!(
+                        "occupancy of {} is {}; it must be 0 or 1",
+                        place(n),
+                        values[n]
+                    ));
+                }
+            }
+            Samples::Uint(values) => {
+                if let (Some(&min), Some(&max)) = (values.iter().min(), values.iter().max()) {
+                    found.include(f64::from(min), f64::from(max));
+                }
+            }
+            Samples::Float(values) => {
+                // Comparisons without branches, so that the compiler uses its lanes.
+                let (mut min, mut max, mut all_finite) = (f32::INFINITY, f32::NEG_INFINITY, true);
+                for &value in *values {
+                    all_finite &= value.is_finite();
+                    min = if value < min { value } else { min };
+                    max = if value > max { value } else { max };
+                }
+                if !all_finite {
+                    if let Some(n) = values.iter().position(|v| v.is_nan()) {
+                        return Err(format!(
+                            "{name} of {} is NaN; every sample must be a number",
+                            place(n)
+                        ));
+                    }
+                    let finite = || values.iter().copied().filter(|v| v.is_finite());
+                    found.infinite = (values.len() - finite().count()) as u64;
+                    min = finite().fold(f32::INFINITY, f32::min);
+                    max = finite().fold(f32::NEG_INFINITY, f32::max);
+                }
+                found.include(f64::from(min), f64::from(max));
+                if name == "fraction" {
+                    if let Some(n) = values.iter().position(|v| !(0.0..=1.0).contains(v)) {
+                        return Err(format!(
+                            "fraction of {} is {}; it must be between 0 and 1",
+                            place(n),
+                            values[n]
+                        ));
+                    }
+                    found.sum = values.iter().map(|&v| f64::from(v)).sum();
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    fn include(&mut self, min: f64, max: f64) {
+        self.min = self.min.min(min);
+        self.max = self.max.max(max);
+    }
+
+    /// Of several layers, in their order.
+    pub(super) fn join(layers: impl Iterator<Item = Self>) -> Self {
+        layers.fold(Self::NONE, |a, b| Self {
+            min: a.min.min(b.min),
+            max: a.max.max(b.max),
+            count: a.count + b.count,
+            sum: a.sum + b.sum,
+            infinite: a.infinite + b.infinite,
+        })
+    }
+
+    /// Least and greatest finite sample, where there is one.
+    pub(super) fn range(&self) -> Option<[f64; 2]> {
+        // A range of zeros has one sign, whatever the order of the samples.
+        (self.min <= self.max).then_some([self.min + 0.0, self.max + 0.0])
+    }
+}
+
+/// A volume that can be a channel of a stack.
+pub trait StackChannel: Sync {
+    /// The grid of the values.
+    fn grid(&self) -> &GridSpec;
+    /// The type of the samples in the file.
+    fn kind(&self) -> SampleKind;
+    /// The samples of layer `k`.
+    fn layer(&self, k: usize) -> Samples<'_>;
+}
+
+impl StackChannel for Volume<f32> {
+    fn grid(&self) -> &GridSpec {
+        self.grid()
+    }
+
+    fn kind(&self) -> SampleKind {
+        SampleKind::Float
+    }
+
+    fn layer(&self, k: usize) -> Samples<'_> {
+        Samples::Float(self.layer(k))
+    }
+}
+
+impl StackChannel for Volume<u8> {
+    fn grid(&self) -> &GridSpec {
+        self.grid()
+    }
+
+    fn kind(&self) -> SampleKind {
+        SampleKind::Half
+    }
+
+    fn layer(&self, k: usize) -> Samples<'_> {
+        Samples::Half(self.layer(k))
+    }
+}
+
+impl StackChannel for Volume<u32> {
+    fn grid(&self) -> &GridSpec {
+        self.grid()
+    }
+
+    fn kind(&self) -> SampleKind {
+        SampleKind::Uint
+    }
+
+    fn layer(&self, k: usize) -> Samples<'_> {
+        Samples::Uint(self.layer(k))
+    }
+}
+
+/// Writes volumes in memory as a stack in the new or empty directory `path`, in parallel.
+///
+/// Lengths are labelled `m`. Volumes of different types go together as `&dyn StackChannel`:
+///
+/// ```
+/// # use glam::DVec3;
+/// # use voxlathe::grid::{GridSpec, Volume};
+/// use voxlathe::io::exr::{StackChannel, write_stack};
+/// # let dir = tempfile::tempdir()?;
+/// # let out = dir.path().join("out");
+/// # let grid = GridSpec::new([2, 3, 5], DVec3::ZERO, DVec3::ONE)?;
+/// # let sdf = Volume::new(grid, vec![-0.5_f32; 30]);
+/// # let occupancy = Volume::new(grid, vec![1_u8; 30]);
+/// let channels: [(&str, &dyn StackChannel); 2] = [("sdf", &sdf), ("occupancy", &occupancy)];
+/// let manifest = write_stack(&out, &grid, &channels)?;
+/// assert_eq!(manifest.voxels_inside, Some(30));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`IoError::Mismatch`] when a volume has another grid, and as [`StackWriter`].
+pub fn write_stack<C: StackChannel + ?Sized>(
+    path: impl AsRef<Path>,
+    grid: &GridSpec,
+    channels: &[(&str, &C)],
+) -> Result<Manifest, IoError> {
+    let options = StackOptions::default();
+    let specs = channels
+        .iter()
+        .map(|(name, volume)| {
+            if volume.grid() == grid {
+                Ok(ChannelSpec::named(name, volume.kind(), &options.units))
+            } else {
+                Err(IoError::Mismatch {
+                    path: path.as_ref().into(),
+                    reason: format!(
+                        "channel {name:?} was sampled on another grid; sample every channel on the stack's"
+                    ),
+                })
+            }
+        })
+        .collect::<Result<_, _>>()?;
+    let writer = StackWriter::create(path, grid, specs, options)?;
+    (0..grid.dims()[2]).into_par_iter().try_for_each(|k| {
+        let layer: Vec<_> = channels
+            .iter()
+            .map(|(name, volume)| (*name, volume.layer(k)))
+            .collect();
+        writer.write_samples(k, &layer)
+    })?;
+    writer.finish(StackSummary::default())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::io::exr::{Attribute, decode_layer};
+    use glam::DVec3;
+    use std::fs;
+
+    const DIMS: [usize; 3] = [7, 13, 5];
+
+    pub(in super::super) fn grid() -> GridSpec {
+        GridSpec::new(DIMS, DVec3::new(-0.1, 0.2, 0.3), DVec3::splat(0.5)).unwrap()
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "small test volumes")]
+    fn layer_values(k: usize) -> (Vec<u8>, Vec<f32>, Vec<f32>, Vec<u32>) {
+        let n = DIMS[0] * DIMS[1];
+        let sdf: Vec<f32> = (0..n).map(|i| (i + k * n) as f32 * 0.01 - 1.0).collect();
+        (
+            sdf.iter().map(|&d| u8::from(d <= 0.0)).collect(),
+            sdf.iter().map(|&d| (0.5 - d).clamp(0.0, 1.0)).collect(),
+            sdf.clone(),
+            sdf.iter().map(|&d| u32::from(d <= 0.0) * 2).collect(),
+        )
+    }
+
+    fn specs() -> Vec<ChannelSpec> {
+        [
+            ("occupancy", SampleKind::Half),
+            ("fraction", SampleKind::Float),
+            ("sdf", SampleKind::Float),
+            ("material", SampleKind::Uint),
+        ]
+        .map(|(name, kind)| ChannelSpec::named(name, kind, "mm"))
+        .to_vec()
+    }
+
+    fn options() -> StackOptions {
+        StackOptions {
+            units: "mm".into(),
+            scene: Some(SceneLabel {
+                name: "ramp".into(),
+                hash: "f00".into(),
+            }),
+            ..StackOptions::default()
+        }
+    }
+
+    fn write_one(writer: &StackWriter, k: usize) -> Result<(), IoError> {
+        let (occupancy, fraction, sdf, material) = layer_values(k);
+        writer.write_layer(
+            k,
+            &LayerChannels {
+                occupancy: Some(&occupancy),
+                fraction: Some(&fraction),
+                sdf: Some(&sdf),
+                material: Some(&material),
+            },
+        )
+    }
+
+    pub(in super::super) fn write_ramp(path: &Path, threads: usize, force: bool) -> Manifest {
+        let options = StackOptions { force, ..options() };
+        let writer = StackWriter::create(path, &grid(), specs(), options).unwrap();
+        std::thread::scope(|scope| {
+            for t in 0..threads {
+                let writer = &writer;
+                scope.spawn(move || {
+                    for k in (0..DIMS[2]).rev().filter(|k| k % threads == t) {
+                        write_one(writer, k).unwrap();
+                    }
+                });
+            }
+        });
+        writer.write_other("notes.txt", b"a note").unwrap();
+        writer
+            .finish(StackSummary {
+                volume_exact: Some(1.25),
+                scene: serde_json::json!({ "schema": 1 }),
+                ..StackSummary::default()
+            })
+            .unwrap()
+    }
+
+    #[test]
+    fn threads_and_order_do_not_show() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut first: Option<BTreeMap<_, _>> = None;
+        for threads in [1, 2, 3, 8] {
+            let out = dir.path().join(threads.to_string());
+            write_ramp(&out, threads, false);
+            let files: BTreeMap<_, _> = fs::read_dir(&out)
+                .unwrap()
+                .map(|e| e.unwrap())
+                .map(|e| (e.file_name(), fs::read(e.path()).unwrap()))
+                .collect();
+            assert_eq!(files.len(), 7);
+            assert_eq!(first.get_or_insert_with(|| files.clone()), &files);
+        }
+    }
+
+    #[test]
+    fn manifest_tells_what_the_layers_hold() {
+        let dir = tempfile::tempdir().unwrap();
+        let manifest = write_ramp(dir.path(), 2, false);
+        assert_eq!(Manifest::load(dir.path()).unwrap(), manifest);
+        assert_eq!(manifest.compression, "none");
+        let bytes: u64 = fs::read_dir(dir.path())
+            .unwrap()
+            .map(|e| e.unwrap().metadata().unwrap().len())
+            .sum();
+        assert!(bytes <= largest_stack_bytes(&grid(), &specs()));
+        assert_eq!(manifest.grid.dims, DIMS);
+        let all: Vec<_> = (0..DIMS[2]).map(layer_values).collect();
+        let inside: usize = all.iter().flat_map(|l| &l.0).filter(|&&v| v == 1).count();
+        assert_eq!(manifest.voxels_inside, Some(inside as u64));
+        assert_eq!(manifest.volume_occupancy, Some(inside as f64 * 0.125));
+        let sum: f64 = all
+            .iter()
+            .map(|l| l.1.iter().map(|&v| f64::from(v)).sum::<f64>())
+            .sum();
+        assert_eq!(manifest.volume_fraction, Some(sum * 0.125));
+        let range = |n: usize| manifest.channels[n].range;
+        assert_eq!(range(0), Some([0.0, 1.0]));
+        assert_eq!(range(2).unwrap()[0], -1.0);
+        assert_eq!(range(3), Some([0.0, 2.0]));
+        assert_eq!(manifest.channels[2].unit.as_deref(), Some("mm"));
+        assert_eq!(manifest.channels[1].unit, None);
+        assert_eq!(manifest.files[3].z, Some(0.3 + 3.5 * 0.5));
+        assert_eq!(manifest.files[5].name, "notes.txt");
+        assert_eq!(manifest.files[5].slice, None);
+        let bytes = fs::read(dir.path().join("slice-0003.exr")).unwrap();
+        let layer = decode_layer(&bytes).unwrap();
+        assert_eq!(layer.channel("sdf").unwrap().to_f32(), layer_values(3).2);
+        assert_eq!(layer.attributes["voxlathe:slice"], Attribute::Int(3));
+        assert_eq!(
+            layer.attributes["voxlathe:scene"],
+            Attribute::Text("ramp".into())
+        );
+    }
+
+    #[test]
+    fn unfinished_stacks_leave_no_trace() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let writer = StackWriter::create(&out, &grid(), specs(), options()).unwrap();
+        write_one(&writer, 2).unwrap();
+        let error = writer.finish(StackSummary::default()).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "{}: layer 0 was never written; write every layer before finishing the stack",
+                out.display()
+            )
+        );
+        assert!(!out.exists());
+        let writer = StackWriter::create(&out, &grid(), specs(), options()).unwrap();
+        for k in 0..DIMS[2] {
+            write_one(&writer, k).unwrap();
+        }
+        let summary = StackSummary {
+            volume_exact: Some(f64::INFINITY),
+            ..StackSummary::default()
+        };
+        assert_eq!(
+            writer.finish(summary).unwrap_err().to_string(),
+            format!(
+                "{}: volume_exact has the value inf; it must be finite",
+                out.join("manifest.json").display()
+            )
+        );
+        assert!(!out.exists());
+    }
+
+    #[test]
+    fn force_replaces_an_old_stack() {
+        let dir = tempfile::tempdir().unwrap();
+        write_ramp(dir.path(), 1, false);
+        fs::write(dir.path().join("slice-0099.exr"), "stale").unwrap();
+        let refused = StackWriter::create(dir.path(), &grid(), specs(), options());
+        assert!(matches!(refused, Err(IoError::NotEmpty { entries: 8, .. })));
+        write_ramp(dir.path(), 2, true);
+        assert!(!dir.path().join("slice-0099.exr").exists());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 7);
+    }
+
+    #[test]
+    fn wrong_layers_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let writer = StackWriter::create(
+            dir.path(),
+            &grid(),
+            vec![ChannelSpec::named("sdf", SampleKind::Float, "m")],
+            StackOptions::default(),
+        )
+        .unwrap();
+        let mut sdf = vec![1.0_f32; 91];
+        let text = |k: usize, layer: &[(&str, Samples<'_>)]| {
+            let error = writer.write_samples(k, layer).unwrap_err().to_string();
+            error.replace(&dir.path().display().to_string(), "out")
+        };
+        assert_eq!(
+            text(5, &[("sdf", Samples::Float(&sdf))]),
+            "out: layer 5 is outside a grid of 5 layers; write layers 0 to 4"
+        );
+        assert_eq!(
+            text(0, &[("sdf", Samples::Float(&sdf[1..]))]),
+            "out/slice-0000.exr: channel \"sdf\" has 90 samples; a layer of 7 x 13 voxels needs 91"
+        );
+        assert_eq!(
+            text(0, &[("sdf", Samples::Half(&[0; 91]))]),
+            "out/slice-0000.exr: the layer has no channel \"sdf\" of type Float; give each layer every channel of the stack"
+        );
+        assert_eq!(
+            text(
+                0,
+                &[("sdf", Samples::Float(&sdf)), ("x", Samples::Float(&sdf))]
+            ),
+            "out/slice-0000.exr: the layer has 2 channels, the stack 1; declare every channel when the stack is created"
+        );
+        sdf[8] = f32::NAN;
+        assert_eq!(
+            text(0, &[("sdf", Samples::Float(&sdf))]),
+            "out/slice-0000.exr: sdf of voxel (1, 1) is NaN; every sample must be a number"
+        );
+        sdf[8] = f32::INFINITY;
+        let layer = [("sdf", Samples::Float(&sdf))];
+        writer.write_samples(0, &layer).unwrap();
+        assert_eq!(
+            text(0, &layer),
+            "out/slice-0000.exr was written twice; each file of a stack has one writer"
+        );
+        for k in 1..5 {
+            writer.write_samples(k, &layer).unwrap();
+        }
+        let manifest = writer.finish(StackSummary::default()).unwrap();
+        assert_eq!(
+            manifest.warnings,
+            ["5 samples of sdf are infinite; its range is that of the others"]
+        );
+        assert_eq!(manifest.channels[0].range, Some([1.0, 1.0]));
+        for (name, samples, reason) in [
+            (
+                "occupancy",
+                Samples::Half(&[0, 2]),
+                "occupancy of voxel (1, 0) is 2; it must be 0 or 1",
+            ),
+            (
+                "fraction",
+                Samples::Float(&[1.5]),
+                "fraction of voxel (0, 0) is 1.5; it must be between 0 and 1",
+            ),
+        ] {
+            assert_eq!(Statistics::of(name, &samples, 7), Err(reason.into()));
+        }
+    }
+
+    #[test]
+    fn volumes_of_every_type_make_a_stack() {
+        let dir = tempfile::tempdir().unwrap();
+        let grid = grid();
+        let sdf = Volume::new(grid, vec![-1.0_f32; 455]);
+        let ids = Volume::new(grid, vec![7_u32; 455]);
+        let occupancy = Volume::new(grid, vec![1_u8; 455]);
+        write_stack(dir.path().join("a"), &grid, &[("sdf", &sdf)]).unwrap();
+        write_stack(
+            dir.path().join("b"),
+            &grid,
+            &[("ids", &ids), ("material", &ids)],
+        )
+        .unwrap();
+        let all: [(&str, &dyn StackChannel); 3] =
+            [("sdf", &sdf), ("material", &ids), ("occupancy", &occupancy)];
+        let manifest = write_stack(dir.path().join("c"), &grid, &all).unwrap();
+        assert_eq!(manifest.voxels_inside, Some(455));
+        assert_eq!(manifest.scene_hash, None);
+        let other = GridSpec::new(DIMS, DVec3::ZERO, DVec3::ONE).unwrap();
+        assert!(matches!(
+            write_stack(dir.path().join("d"), &other, &[("sdf", &sdf)]),
+            Err(IoError::Mismatch { .. })
+        ));
+        assert!(!dir.path().join("d").exists());
+    }
+}
