@@ -1,3 +1,5 @@
 //! The `voxlathe` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    voxlathe::cli::run()
+}

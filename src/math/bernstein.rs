@@ -208,12 +208,12 @@ fn bracketed_root(c: &[Dd]) -> Dd {
         if (hi - lo).f64() <= super::tolerance::PARAMETER_RESOLUTION {
             break;
         }
-        let newton = if d == Dd::ZERO { lo } else { t - v / d };
-        let step = (newton - t).abs().f64();
-        t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
-        if step <= super::tolerance::PARAMETER_RESOLUTION {
+        let step = if d == Dd::ZERO { Dd::ONE } else { v / d };
+        if step.abs().f64() <= super::tolerance::PARAMETER_RESOLUTION {
             break;
         }
+        let newton = t - step;
+        t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
     }
     t
 }

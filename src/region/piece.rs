@@ -134,12 +134,12 @@ impl Piece {
             if (hi - lo).f64() <= PARAMETER_RESOLUTION {
                 break;
             }
-            let newton = if slope == Dd::ZERO { lo } else { t - value / slope };
-            let step = (newton - t).abs().f64();
-            t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
-            if step <= PARAMETER_RESOLUTION {
+            let step = if slope == Dd::ZERO { Dd::ONE } else { value / slope };
+            if step.abs().f64() <= PARAMETER_RESOLUTION {
                 break;
             }
+            let newton = t - step;
+            t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
         }
         t
     }

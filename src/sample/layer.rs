@@ -189,8 +189,7 @@ impl<'a> LayerSampler<'a> {
 }
 
 /// The stored form of a signed distance: nearest f32, but never across zero.
-#[must_use]
-pub fn to_f32(distance: f64) -> f32 {
+fn to_f32(distance: f64) -> f32 {
     #[allow(clippy::cast_possible_truncation, reason = "the one place where distances become f32")]
     let value = distance as f32;
     if distance > 0.0 && value == 0.0 { f32::from_bits(1) } else { value + 0.0 }

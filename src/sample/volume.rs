@@ -59,6 +59,11 @@ fn fits(grid: &GridSpec, bytes: u64) -> Result<(), crate::Error> {
     if isize::try_from(needed).is_ok() {
         Ok(())
     } else {
-        Err(crate::Error::TooLarge { needed, available: isize::MAX as u64 })
+        Err(crate::Error::TooLarge {
+            what: "a volume in memory".into(),
+            needed,
+            available: isize::MAX as u64,
+            remedy: "stream its layers instead".into(),
+        })
     }
 }

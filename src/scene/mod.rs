@@ -19,6 +19,7 @@
 use std::io::Read;
 use std::path::Path;
 
+mod build;
 mod error;
 mod fields;
 mod json;
@@ -36,6 +37,7 @@ mod solid;
 mod tests;
 mod value;
 
+pub use build::Scene;
 pub use error::{InputProblem, Place, SceneError, Sources};
 pub use limits::{
     MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME, MAX_TEXT_BYTES, MAX_VOXELS,

@@ -57,10 +57,6 @@ impl Body {
         &self.frame
     }
 
-    pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
-        &self.boundary
-    }
-
     /// Coordinates along a grid axis of the flat faces normal to it, where the solid's axis is
     /// parallel to that grid axis.
     pub(crate) fn flat_faces(&self, axis: usize) -> Vec<f64> {

@@ -1,0 +1,220 @@
+//! What can be typed.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Exact voxel grids and signed distances of solids of revolution given by NURBS profiles.
+#[derive(Debug, Parser)]
+#[command(
+    name = "voxlathe",
+    version,
+    after_help = "\
+Exit codes: 0 done; 1 a validation, comparison or digest failed; 2 bad usage or bad input;
+3 input or output failed; 130 or 143 interrupted.
+
+Example: voxlathe voxelize scenes/goblet.toml -o out/goblet --resolution 256",
+    arg_required_else_help = true,
+    subcommand_required = true
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    pub(super) common: Common,
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Common {
+    /// Threads to use; all cores without it. The results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    pub(super) threads: Option<NonZeroUsize>,
+    /// Say nothing but errors
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    pub(super) quiet: bool,
+    /// Say what is being done, on standard error
+    #[arg(long, short, global = true)]
+    pub(super) verbose: bool,
+    /// When to colour what people read
+    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t = Color::Auto)]
+    pub(super) color: Color,
+    /// Change a key of the scene, may be repeated: a dotted path with array indices from 0, and a
+    /// value as TOML, else as a string (grid.resolution=64, solid.0.angle=270, units=mm)
+    #[arg(long, global = true, value_name = "PATH=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Write one JSON document to standard output, and nothing else there
+    #[arg(long, global = true)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Color {
+    /// On a terminal, unless NO_COLOR is set
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Sample a scene into a stack of EXR images and a manifest
+    Voxelize(Voxelize),
+    /// Membership and signed distance at given points
+    Query(Query),
+    /// Show what a finished stack holds, and verify its digests
+    Info(Info),
+    /// Write a manual page, shell completions or the schema of scene files to standard output
+    Generate(Generate),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+DIR/slice-0000.exr ... hold one z layer each: column = x, row = y, row 0 is the smallest y. Files appear under
+their final names only when all are whole; DIR/manifest.json comes last.
+
+Example: voxlathe voxelize scenes/torus.toml -o out/torus --channels occupancy,sdf --band 3")]
+pub(super) struct Voxelize {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// Directory to write
+    #[arg(long, short, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// Voxels along the longest side, or along each side as NX,NY,NZ
+    #[arg(long, value_name = "N", value_delimiter = ',', num_args = 1, conflicts_with = "spacing")]
+    pub(super) resolution: Vec<u32>,
+    /// Size of a voxel in scene units, or DX,DY,DZ
+    #[arg(long, value_name = "D", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    pub(super) spacing: Vec<f64>,
+    /// What to sample: occupancy, fraction, sdf, material
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(super) channels: Vec<String>,
+    /// Formats to write: exr
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(super) formats: Vec<String>,
+    /// none, rle, zips, zip, piz, pxr24 (24-bit floats: lossy) or auto
+    #[arg(long, value_name = "KIND")]
+    pub(super) compression: Option<String>,
+    /// Clamp distances to this many voxels on both sides of the surface
+    #[arg(long, value_name = "VOXELS", allow_negative_numbers = true)]
+    pub(super) band: Option<f64>,
+    /// Most memory to use for layers, as 512MiB, 2G or bytes; half of the machine's without it
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(super) memory_limit: Option<u64>,
+    /// Replace the stack in DIR: exactly the files its manifest lists, and stale slices
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Say what would be written, and write nothing
+    #[arg(long)]
+    pub(super) dry_run: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Without -o the table goes to standard output as CSV. A .npy file gets float64 of shape (n, columns).
+
+Example: voxlathe query scenes/torus.toml --points points.csv --columns sdf")]
+pub(super) struct Query {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// Points: .csv (x,y,z on a line) or .npy (float64, shape (n, 3))
+    #[arg(long, value_name = "FILE")]
+    pub(super) points: PathBuf,
+    /// File to write, .csv or .npy
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Columns: inside (0 or 1), sdf (signed distance in scene units, negative inside)
+    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "inside,sdf")]
+    pub(super) columns: Vec<Column>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Column {
+    /// 1 inside, 0 outside
+    Inside,
+    /// Signed distance
+    Sdf,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "Exit code 1 when a file is missing or its digest differs.")]
+pub(super) struct Info {
+    /// Directory of a finished stack
+    #[arg(value_name = "DIR")]
+    pub(super) directory: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Generate {
+    /// What to write
+    #[arg(value_enum)]
+    pub(super) kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Kind {
+    /// Manual page (troff)
+    Man,
+    /// Completions for bash
+    Bash,
+    /// Completions for zsh
+    Zsh,
+    /// Completions for fish
+    Fish,
+    /// Completions for PowerShell
+    Powershell,
+    /// JSON Schema of scene files
+    Schema,
+}
+
+/// A number of bytes: a number and a unit, 1024-based for KiB, MiB, GiB, TiB and the bare letters,
+/// 1000-based for kB, MB, GB, TB.
+fn parse_size(text: &str) -> Result<u64, String> {
+    let wanted = || format!("{text:?} is not a size; write bytes, or a number with KiB, MiB, GiB, TiB, K, M, G, T, kB, MB, GB or TB");
+    let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let number: f64 = number.parse().map_err(|_| wanted())?;
+    let factor = match unit.trim() {
+        "" | "B" => 1.0,
+        "K" | "k" | "KiB" => 1024.0,
+        "M" | "MiB" => 1024.0 * 1024.0,
+        "G" | "GiB" => 1024.0 * 1024.0 * 1024.0,
+        "T" | "TiB" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        "kB" => 1e3,
+        "MB" => 1e6,
+        "GB" => 1e9,
+        "TB" => 1e12,
+        _ => return Err(wanted()),
+    };
+    let bytes = number * factor;
+    if !(bytes >= 1.0 && bytes < 9e18) {
+        return Err(wanted());
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
+    Ok(bytes as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arguments_are_consistent() {
+        use clap::CommandFactory;
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_are_read_with_their_units() {
+        assert_eq!(parse_size("512"), Ok(512));
+        assert_eq!(parse_size("1.5KiB"), Ok(1536));
+        assert_eq!(parse_size("2G"), Ok(2 << 30));
+        assert_eq!(parse_size("3MB"), Ok(3_000_000));
+        for bad in ["", "x", "-1", "1e3", "10 parsecs", "NaN", "0"] {
+            assert!(parse_size(bad).is_err(), "{bad:?}");
+        }
+    }
+}

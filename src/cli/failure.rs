@@ -1,0 +1,121 @@
+//! Failures: the message, and the exit code.
+
+use super::interrupt;
+use super::output::{self, Console};
+use crate::error::Error;
+use crate::io::IoErrorKind;
+use crate::scene::SceneError;
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
+use std::process::ExitCode;
+
+/// Why a command ended without its result.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// Bad usage, found after the arguments were read.
+    Usage(String),
+    /// Standard output could not be written.
+    Output(String),
+    /// Anything of the library.
+    Library(Error),
+}
+
+impl Failure {
+    pub(super) fn usage(text: impl Into<String>) -> Self {
+        Self::Usage(text.into())
+    }
+
+    pub(super) fn output(error: &std::io::Error) -> Self {
+        Self::Output(format!("cannot write to standard output: {error}"))
+    }
+
+    fn code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Output(_) => 3,
+            Self::Library(error) => match error {
+                Error::Scene(SceneError::Read { .. }) => 3,
+                Error::Io(e) => match e.kind() {
+                    IoErrorKind::Damaged => 1,
+                    IoErrorKind::BadInput => 2,
+                    _ => 3,
+                },
+                Error::Interrupted => interrupt::code(),
+                _ => 2,
+            },
+        }
+    }
+
+    /// The message with everything that caused it.
+    fn message(&self) -> String {
+        match self {
+            Self::Usage(text) | Self::Output(text) => text.clone(),
+            Self::Library(error) => {
+                let mut text = error.to_string();
+                let mut cause = std::error::Error::source(error);
+                while let Some(e) = cause {
+                    text = format!("{text}: {e}");
+                    cause = e.source();
+                }
+                text
+            }
+        }
+    }
+
+    /// Tells the user, and gives the exit code.
+    pub(super) fn report(&self, console: &Console) -> ExitCode {
+        use std::io::Write;
+        let label = if console.colored() { "\u{1b}[1;31merror\u{1b}[0m" } else { "error" };
+        let mut text = format!("{label}: {}\n", self.message());
+        if let Self::Library(Error::Scene(scene)) = self {
+            text.push_str(&excerpt(scene, console.colored()));
+        }
+        // Nobody is left to tell when standard error is gone.
+        let _ = std::io::stderr().write_all(text.as_bytes());
+        if console.json() {
+            let document = serde_json::json!({ "error": { "message": self.message(), "exit_code": self.code() } });
+            let _ = output::print(&format!("{document:#}\n"));
+        }
+        ExitCode::from(self.code())
+    }
+}
+
+impl<E: Into<Error>> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Library(error.into())
+    }
+}
+
+/// The lines of the scene around what is wrong.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+struct Excerpt {
+    message: String,
+    source_text: NamedSource<String>,
+    label: LabeledSpan,
+}
+
+impl Diagnostic for Excerpt {
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        Some(&self.source_text)
+    }
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        Some(Box::new(std::iter::once(self.label.clone())))
+    }
+}
+
+fn excerpt(error: &SceneError, colored: bool) -> String {
+    let (Some(problem), Some((text, span))) = (error.problem(), error.source_text()) else { return String::new() };
+    // A span over many lines is marked at its first.
+    let end = text[span.clone()].find('\n').map_or(span.end, |n| span.start + n);
+    let shown = Excerpt {
+        message: format!("wanted {}", problem.wanted),
+        source_text: NamedSource::new(&problem.source_name, text.to_owned()),
+        label: LabeledSpan::new_with_span(Some(format!("wanted {}", problem.wanted)), span.start..end),
+    };
+    let theme = if colored { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+    let mut out = String::new();
+    match GraphicalReportHandler::new_themed(theme).with_width(120).render_report(&mut out, &shown) {
+        Ok(()) => out,
+        Err(_) => String::new(),
+    }
+}

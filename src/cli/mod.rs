@@ -1,0 +1,63 @@
+//! The command: arguments in, files and reports out. One file per command.
+//!
+//! Results go to standard output, everything meant for people while it runs to standard error.
+
+mod arguments;
+mod failure;
+mod generate;
+mod info;
+mod interrupt;
+mod output;
+mod query;
+mod voxelize;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use failure::Failure;
+use output::Console;
+use std::process::ExitCode;
+
+/// Runs the command with the process's arguments.
+#[must_use]
+pub fn run() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version come this way too, and are no failure.
+            let code = if error.use_stderr() { 2 } else { 0 };
+            return match error.print() {
+                Ok(()) => ExitCode::from(code),
+                Err(_) => ExitCode::from(3),
+            };
+        }
+    };
+    let console = Console::new(&arguments.common);
+    match execute(&arguments, &console) {
+        Ok(code) => code,
+        Err(failure) => failure.report(&console),
+    }
+}
+
+fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure> {
+    let common = &arguments.common;
+    if common.verbose {
+        tracing_subscriber::fmt()
+            .with_writer(std::io::stderr)
+            .with_ansi(console.colored())
+            .with_max_level(tracing::Level::DEBUG)
+            .with_target(false)
+            .init();
+    }
+    let threads = common.threads.map_or(0, std::num::NonZeroUsize::get);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|e| Failure::usage(format!("cannot start {threads} threads: {e}")))?;
+    interrupt::listen();
+    match &arguments.command {
+        Command::Voxelize(a) => voxelize::run(a, common, console),
+        Command::Query(a) => query::run(a, common, console),
+        Command::Info(a) => info::run(a, common, console),
+        Command::Generate(a) => generate::run(a),
+    }
+}

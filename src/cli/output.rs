@@ -1,0 +1,90 @@
+//! Where text goes.
+
+use super::arguments::{Color, Common};
+use super::failure::Failure;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal, Write};
+
+/// The user's wishes about output.
+#[derive(Debug)]
+pub(super) struct Console {
+    json: bool,
+    quiet: bool,
+    colored: bool,
+}
+
+impl Console {
+    pub(super) fn new(common: &Common) -> Self {
+        let colored = match common.color {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()),
+        };
+        Self { json: common.json, quiet: common.quiet, colored }
+    }
+
+    pub(super) fn json(&self) -> bool {
+        self.json
+    }
+
+    pub(super) fn colored(&self) -> bool {
+        self.colored
+    }
+
+    /// A line for people, on standard error.
+    pub(super) fn say(&self, text: &str) {
+        if !self.quiet {
+            // Nobody is left to tell when standard error is gone.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        }
+    }
+
+    pub(super) fn warn(&self, text: &str) {
+        let label = if self.colored { "\u{1b}[1;33mwarning\u{1b}[0m" } else { "warning" };
+        self.say(&format!("{label}: {text}"));
+    }
+
+    /// The result: the document, or the text for people, on standard output.
+    pub(super) fn result(&self, document: &serde_json::Value, text: &str) -> Result<(), Failure> {
+        if self.json {
+            print(&format!("{document:#}\n"))
+        } else if self.quiet {
+            Ok(())
+        } else {
+            print(text)
+        }
+    }
+
+    /// A bar that counts to `length`; hidden where nobody watches.
+    pub(super) fn bar(&self, length: u64, unit: &str) -> ProgressBar {
+        let hidden = self.quiet || !std::io::stderr().is_terminal();
+        let target = if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(Some(length), target);
+        if let Ok(style) = ProgressStyle::with_template(&format!("{{bar:40}} {{pos}}/{{len}} {unit}  {{eta}} left")) {
+            bar.set_style(style);
+        }
+        bar
+    }
+}
+
+/// Writes to standard output; a reader that has gone is no failure of ours.
+pub(super) fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::output(&e)),
+        _ => Ok(()),
+    }
+}
+
+/// Bytes as a person reads them.
+#[allow(clippy::cast_precision_loss, reason = "only shown")]
+pub(super) fn bytes(n: u64) -> String {
+    const UNITS: [&str; 5] = ["bytes", "KiB", "MiB", "GiB", "TiB"];
+    let mut value = n as f64;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < UNITS.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{n} bytes") } else { format!("{value:.1} {}", UNITS[unit]) }
+}

@@ -1,0 +1,74 @@
+//! `voxlathe query`: membership and distance at given points.
+
+use super::arguments::{Column, Common, Query};
+use super::failure::Failure;
+use super::interrupt;
+use super::output::{self, Console};
+use crate::error::Error;
+use crate::io::points;
+use crate::scene::Scene;
+use rayon::prelude::*;
+use serde_json::json;
+use std::process::ExitCode;
+
+/// Points between two looks at the interrupt flag.
+const CHUNK: usize = 4096;
+
+pub(super) fn run(arguments: &Query, common: &Common, console: &Console) -> Result<ExitCode, Failure> {
+    let scene = Scene::load_with(&arguments.scene, &common.set)?;
+    for warning in scene.warnings() {
+        console.warn(warning);
+    }
+    if let Some(path) = &arguments.output {
+        points::check_table_name(path)?;
+    }
+    let points = points::read_points(&arguments.points)?;
+    let bar = console.bar(points.len() as u64, "points");
+    let solid = scene.assembly();
+    let distances = points
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            interrupt::check()?;
+            let values: Vec<f64> = chunk.iter().map(|&p| solid.signed_distance(p)).collect();
+            bar.inc(chunk.len() as u64);
+            Ok(values)
+        })
+        .collect::<Result<Vec<_>, Error>>()?
+        .concat();
+    bar.finish_and_clear();
+    // The sign is that of the membership, so the one column follows from the other.
+    let inside: Vec<f64> = distances.iter().map(|&d| f64::from(u8::from(d <= 0.0))).collect();
+    let columns: Vec<(&str, &[f64])> = arguments
+        .columns
+        .iter()
+        .map(|c| match c {
+            Column::Inside => ("inside", inside.as_slice()),
+            Column::Sdf => ("sdf", distances.as_slice()),
+        })
+        .collect();
+    let count = inside.iter().filter(|&&v| v != 0.0).count();
+    if let Some(path) = &arguments.output {
+        points::write_columns(path, &columns)?;
+    }
+    if console.json() {
+        let names: Vec<&str> = columns.iter().map(|c| c.0).collect();
+        let rows = arguments.output.is_none().then(|| (0..points.len()).map(|i| columns.iter().map(|c| c.1[i]).collect::<Vec<_>>()).collect::<Vec<_>>());
+        let document = json!({
+            "points": points.len(),
+            "inside": count,
+            "units": scene.model().units.name(),
+            "columns": names,
+            "rows": rows,
+            "file": arguments.output,
+            "warnings": scene.warnings(),
+        });
+        console.result(&document, "")?;
+    } else if arguments.output.is_none() {
+        let mut bytes = Vec::new();
+        points::write_csv(&mut bytes, &columns).map_err(|e| Failure::output(&e))?;
+        output::print(&String::from_utf8_lossy(&bytes))?;
+    } else {
+        console.say(&format!("{} points, {count} inside", points.len()));
+    }
+    Ok(ExitCode::SUCCESS)
+}
