@@ -3,7 +3,8 @@
 //! Every lane does what the plain loops do, in their order. Degrees up to 7 have loops of fixed
 //! length, so that the triangle stays in registers; higher ones share a loop with the degree as a
 //! number. What is left over after the last full set of lanes goes through partial loads and stores,
-//! whose idle lanes hold zeros.
+//! whose idle lanes hold zeros. Everything a loop calls is `inline(always)` and no closure: a call
+//! would leave the function that has the instructions switched on, at a cost of some five times.
 
 use super::super::MAX_DEGREE;
 use super::super::basis::SpanFactors;
@@ -102,13 +103,8 @@ fn fill<S: Simd, const N: usize>(simd: S, job: Fill<'_, '_>, p: usize) {
                 climbs[p - j - 1][..=j].copy_from_slice(&n[..=j]);
             }
         }
-        let stride = job.rows.stride;
-        let mut put = |row: usize, lanes: S::f64s| {
-            let at = row * stride + column;
-            store(simd, &mut job.rows.values[at..at + samples.len()], lanes);
-        };
         for (a, &lanes) in n[..=p].iter().enumerate() {
-            put(a, lanes);
+            put(simd, job.rows, a, column, samples.len(), lanes);
         }
         for q in 1..=job.order {
             let climb = &mut climbs[q - 1];
@@ -120,7 +116,14 @@ fn fill<S: Simd, const N: usize>(simd: S, job: Fill<'_, '_>, p: usize) {
                 }
             }
             for (a, &lanes) in climb[..=p].iter().enumerate() {
-                put(q * (p + 1) + a, lanes);
+                put(
+                    simd,
+                    job.rows,
+                    q * (p + 1) + a,
+                    column,
+                    samples.len(),
+                    lanes,
+                );
             }
         }
         column += samples.len();
@@ -128,18 +131,40 @@ fn fill<S: Simd, const N: usize>(simd: S, job: Fill<'_, '_>, p: usize) {
     set_units(job.factors, job.samples, job.rows, job.first);
 }
 
+/// Writes `count` lanes to a row.
+#[inline(always)]
+fn put<S: Simd>(
+    simd: S,
+    rows: &mut Rows<'_>,
+    row: usize,
+    column: usize,
+    count: usize,
+    lanes: S::f64s,
+) {
+    let at = row * rows.stride + column;
+    store(simd, &mut rows.values[at..at + count], lanes);
+}
+
+/// Lanes times one number.
+#[inline(always)]
+fn times<S: Simd>(simd: S, lanes: S::f64s, factor: f64) -> S::f64s {
+    simd.mul_f64s(lanes, simd.splat_f64s(factor))
+}
+
 /// One level of the climb: from functions of degree j - 1 to the derivatives of those of degree j.
 #[inline(always)]
 fn raise<S: Simd>(simd: S, row: &mut [S::f64s], reciprocals: &[f64]) {
     let j = row.len() - 1;
     let factor = simd.splat_f64s(j as f64);
-    let ratio = |n: S::f64s, a: usize| simd.mul_f64s(n, simd.splat_f64s(reciprocals[a]));
-    row[j] = simd.mul_f64s(factor, ratio(row[j - 1], j - 1));
+    row[j] = simd.mul_f64s(factor, times(simd, row[j - 1], reciprocals[j - 1]));
     for a in (1..j).rev() {
-        let difference = simd.sub_f64s(ratio(row[a - 1], a - 1), ratio(row[a], a));
+        let difference = simd.sub_f64s(
+            times(simd, row[a - 1], reciprocals[a - 1]),
+            times(simd, row[a], reciprocals[a]),
+        );
         row[a] = simd.mul_f64s(factor, difference);
     }
-    let difference = simd.sub_f64s(simd.splat_f64s(0.0), ratio(row[0], 0));
+    let difference = simd.sub_f64s(simd.splat_f64s(0.0), times(simd, row[0], reciprocals[0]));
     row[0] = simd.mul_f64s(factor, difference);
 }
 
@@ -187,14 +212,12 @@ fn sum<S: Simd, const N: usize>(simd: S, job: Sum<'_>, p: usize) {
     let control = &job.control[..=p];
     let mut column = job.first;
     for out in job.out.chunks_mut(S::F64_LANES) {
-        let term = |a: usize| {
-            let at = a * job.stride + column;
-            let n = load(simd, &job.basis[at..at + out.len()]);
-            simd.mul_f64s(n, simd.splat_f64s(control[a]))
-        };
-        let mut total = term(0);
-        for a in 1..=p {
-            total = simd.add_f64s(total, term(a));
+        let lanes = column..column + out.len();
+        let mut total = times(simd, load(simd, &job.basis[lanes.clone()]), control[0]);
+        for (a, &c) in control.iter().enumerate().skip(1) {
+            let at = a * job.stride;
+            let n = load(simd, &job.basis[at + lanes.start..at + lanes.end]);
+            total = simd.add_f64s(total, times(simd, n, c));
         }
         store(simd, out, total);
         column += out.len();
@@ -238,18 +261,21 @@ fn project<S: Simd, const N: usize>(simd: S, job: Project<'_, '_>, p: usize) {
             let at = a * job.stride + column;
             *n = load(simd, &job.basis[at..at + lanes]);
         }
-        let sum = |control: &[f64]| {
-            let mut total = simd.mul_f64s(n[0], simd.splat_f64s(control[0]));
-            for a in 1..=p {
-                total = simd.add_f64s(total, simd.mul_f64s(n[a], simd.splat_f64s(control[a])));
-            }
-            total
-        };
-        let w = sum(&job.weights[..=p]);
+        let w = dot(simd, n, &job.weights[..=p]);
         for (control, out) in job.coordinates.iter().zip(job.out.iter_mut()) {
-            let point = simd.div_f64s(sum(&control[..=p]), w);
+            let point = simd.div_f64s(dot(simd, n, &control[..=p]), w);
             store(simd, &mut out[column..column + lanes], point);
         }
         column += lanes;
     }
+}
+
+/// The sum of lanes times numbers, in order; there is at least one.
+#[inline(always)]
+fn dot<S: Simd>(simd: S, n: &[S::f64s], control: &[f64]) -> S::f64s {
+    let mut total = times(simd, n[0], control[0]);
+    for (&n, &c) in n.iter().zip(control).skip(1) {
+        total = simd.add_f64s(total, times(simd, n, c));
+    }
+    total
 }
