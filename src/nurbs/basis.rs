@@ -31,6 +31,24 @@
 use super::{KnotVector, MAX_DEGREE, NurbsError};
 use smallvec::SmallVec;
 
+/// The highest order of derivative that can be asked for.
+///
+/// Twice the highest degree: beyond it binomial coefficients of the quotient rule pass 2^64, and a
+/// request is more likely a mistake than a wish.
+pub const MAX_DERIVATIVE_ORDER: usize = 2 * MAX_DEGREE;
+
+/// The order, when it can be asked for.
+pub(super) fn check_order(order: usize) -> Result<(), NurbsError> {
+    if order <= MAX_DERIVATIVE_ORDER {
+        Ok(())
+    } else {
+        Err(NurbsError::DerivativeOrder {
+            found: order,
+            limit: MAX_DERIVATIVE_ORDER,
+        })
+    }
+}
+
 /// What the basis functions need to know of one span.
 #[derive(Debug, Clone)]
 pub(super) struct SpanFactors {
@@ -177,10 +195,12 @@ impl KnotVector {
     ///
     /// * `u`: parameter, inside [`domain`](Self::domain). At a knot, derivatives are those from
     ///   the right; at the end of the domain, from the left.
-    /// * `order`: highest derivative wanted; those above the degree are zero.
+    /// * `order`: highest derivative wanted, at most [`MAX_DERIVATIVE_ORDER`]; those above the
+    ///   degree are zero.
     ///
     /// # Errors
-    /// [`NurbsError::OutsideDomain`] when `u` is outside the domain or NaN.
+    /// [`NurbsError::OutsideDomain`] when `u` is outside the domain or NaN;
+    /// [`NurbsError::DerivativeOrder`].
     ///
     /// # Source
     /// Piegl & Tiller, Algorithms A2.2, p. 70, and A2.3, p. 72.
@@ -194,6 +214,7 @@ impl KnotVector {
     /// # Ok::<(), voxlathe::nurbs::NurbsError>(())
     /// ```
     pub fn basis_functions(&self, u: f64, order: usize) -> Result<LocalBasis, NurbsError> {
+        check_order(order)?;
         let span = self.find_span(u)?;
         let mut rows = vec![0.0; (order + 1) * (self.degree() + 1)];
         SpanFactors::new(self, span).evaluate(u, order, &mut rows);
@@ -288,6 +309,10 @@ mod tests {
             let error = knots.basis_functions(u, 0).expect_err("outside");
             assert!(matches!(error, NurbsError::OutsideDomain { .. }), "{error}");
         }
+        assert!(matches!(
+            knots.basis_functions(0.5, usize::MAX),
+            Err(NurbsError::DerivativeOrder { limit: 64, .. })
+        ));
     }
 
     #[test]

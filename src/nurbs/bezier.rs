@@ -21,6 +21,7 @@
 //! * Source: Piegl & Tiller, *The NURBS Book*, 2nd ed., §1.3, §1.7 and §5.3; L. Ramshaw, *Blossoms
 //!   are polar forms*, CAGD 6 (1989).
 
+use super::basis::check_order;
 use super::curve::bounds;
 use super::knot_vector::check_degree;
 use super::{Homogeneous, KnotVector, NurbsCurve, NurbsError, rational_derivatives};
@@ -129,7 +130,8 @@ impl<const D: usize> RationalBezier<D> {
     /// Entry k is the derivative of order k, in model units; the first is the point.
     ///
     /// # Errors
-    /// [`NurbsError::OutsideDomain`] when `t` is outside [0, 1] or NaN.
+    /// [`NurbsError::OutsideDomain`] when `t` is outside [0, 1] or NaN;
+    /// [`NurbsError::DerivativeOrder`].
     ///
     /// # Source
     /// Piegl & Tiller, §1.3 (derivative of a Bézier curve) and Algorithm A4.2.
@@ -143,6 +145,7 @@ impl<const D: usize> RationalBezier<D> {
     /// ```
     pub fn derivatives(&self, t: f64, order: usize) -> Result<Vec<[f64; D]>, NurbsError> {
         check_local(t)?;
+        check_order(order)?;
         let mut differences = self.points.clone();
         let mut factor = 1.0;
         let mut sums = Vec::with_capacity(order + 1);

@@ -235,10 +235,12 @@ impl<const D: usize> NurbsCurve<D> {
     /// derivatives are those from the right; at the end of the domain, from the left.
     ///
     /// * `u`: parameter, inside [`domain`](Self::domain).
-    /// * `order`: highest derivative wanted.
+    /// * `order`: highest derivative wanted, at most
+    ///   [`MAX_DERIVATIVE_ORDER`](super::MAX_DERIVATIVE_ORDER).
     ///
     /// # Errors
-    /// [`NurbsError::OutsideDomain`] when `u` is outside the domain or NaN.
+    /// [`NurbsError::OutsideDomain`] when `u` is outside the domain or NaN;
+    /// [`NurbsError::DerivativeOrder`].
     ///
     /// # Source
     /// Piegl & Tiller, Algorithm A4.2, p. 127.

@@ -186,8 +186,8 @@ pub enum NurbsError {
         /// The length wanted.
         expected: usize,
     },
-    /// A table does not hold derivatives of that order.
-    #[error("derivatives of order {found} asked for; the table holds up to order {limit}")]
+    /// The order is beyond what a table holds, or beyond what can be asked for.
+    #[error("derivatives of order {found} asked for; there are those up to order {limit}")]
     DerivativeOrder {
         /// The order asked for.
         found: usize,

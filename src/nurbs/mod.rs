@@ -35,7 +35,7 @@ mod refine;
 #[cfg(test)]
 mod testing;
 
-pub use basis::LocalBasis;
+pub use basis::{LocalBasis, MAX_DERIVATIVE_ORDER};
 pub use bezier::{BezierPiece, RationalBezier};
 pub use cache::{BasisCache, BasisTable, combine, tabulate};
 pub use curve::NurbsCurve;
