@@ -6,6 +6,7 @@ pub mod error;
 pub mod grid;
 pub mod io;
 pub mod math;
+pub mod nurbs;
 pub mod region;
 pub mod sample;
 pub mod scene;

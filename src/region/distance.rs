@@ -283,6 +283,9 @@ fn root(h: &[f64]) -> f64 {
             return t;
         }
         let newton = t - v / d;
+        if (v / d).abs() <= f64::EPSILON * 0.25 {
+            return t;
+        }
         let inside = newton > lo && newton < hi;
         let next = if inside { newton } else { 0.5 * (lo + hi) };
         let step = (next - t).abs();

@@ -8,10 +8,12 @@ use super::boundary::{self, BoundaryPiece};
 use super::crossings::{Count, CrossingSet, MeridianPoint, Winding};
 use super::curve::{self, Bezier, ProfileCurve};
 use super::error::RegionError;
-use super::piece::{self, Piece};
+use super::piece::{self, Piece, TABLE};
 use super::tree::BoxTree;
 use crate::math::tolerance::{BELOW_AXIS, GAP};
 use crate::math::{Dd, Real};
+use crate::nurbs::{self, BasisCache, KnotVector};
+use std::sync::OnceLock;
 
 
 /// Curves in order, head to tail.
@@ -320,12 +322,23 @@ fn add_pieces(loop_index: usize, cut: &Cut, size: f64, unit: f64, pieces: &mut V
     Ok(())
 }
 
-/// Fills the pieces' tables of points at uniform parameters, from one cached basis per degree.
+/// Fills the pieces' tables of points at uniform parameters. All pieces of a degree share one
+/// cached table of basis functions, so a piece costs three contractions of it.
 fn tabulate(pieces: &mut [Piece]) {
-
+    static CACHE: OnceLock<BasisCache> = OnceLock::new();
+    let cache = CACHE.get_or_init(BasisCache::default);
+    #[allow(clippy::cast_precision_loss, reason = "a small count")]
+    let parameters: [f64; TABLE + 1] = std::array::from_fn(|i| i as f64 / TABLE as f64);
     for piece in pieces.iter_mut().filter(|p| p.degree() > 1) {
-        #[allow(clippy::cast_precision_loss, reason = "a small count")]
-        let table = (0..=piece::TABLE).map(|i| piece.twin.at(i as f64 / piece::TABLE as f64)).collect();
-        piece.twin.table = table;
+        let table = KnotVector::bezier(piece.degree()).and_then(|knots| cache.table(&knots, &parameters, 0));
+        let (mut r, mut z) = ([0.0; TABLE + 1], [0.0; TABLE + 1]);
+        let filled = table.and_then(|table| {
+            let [wr, wz, w] = &piece.twin.coefficients;
+            nurbs::tabulate(cache.kernel(), &table, &[wr, wz], w, &mut [&mut r, &mut z])
+        });
+        // Degrees beyond the cache's do without a table; it only narrows searches.
+        if filled.is_ok() {
+            piece.twin.table = r.into_iter().zip(z).map(|(r, z)| [r, z]).collect();
+        }
     }
 }
