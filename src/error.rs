@@ -30,7 +30,9 @@ pub enum Error {
         remedy: String,
     },
     /// Distances of the grid leave the range of stored numbers.
-    #[error("{what} is {found:e} {units}; f32 distances need {wanted}; choose other units or leave out the sdf channel")]
+    #[error(
+        "{what} is {found:e} {units}; f32 distances need {wanted}; choose other units or leave out the sdf channel"
+    )]
     Range {
         /// The length.
         what: &'static str,

@@ -83,10 +83,22 @@ pub(super) struct Voxelize {
     #[arg(long, short, value_name = "DIR")]
     pub(super) output: PathBuf,
     /// Voxels along the longest side, or along each side as NX,NY,NZ
-    #[arg(long, value_name = "N", value_delimiter = ',', num_args = 1, conflicts_with = "spacing")]
+    #[arg(
+        long,
+        value_name = "N",
+        value_delimiter = ',',
+        num_args = 1,
+        conflicts_with = "spacing"
+    )]
     pub(super) resolution: Vec<u32>,
     /// Size of a voxel in scene units, or DX,DY,DZ
-    #[arg(long, value_name = "D", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "D",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_negative_numbers = true
+    )]
     pub(super) spacing: Vec<f64>,
     /// What to sample: occupancy, fraction, sdf, material
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
@@ -127,7 +139,12 @@ pub(super) struct Query {
     #[arg(long, short, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// Columns: inside (0 or 1), sdf (signed distance in scene units, negative inside)
-    #[arg(long, value_name = "A,B", value_delimiter = ',', default_value = "inside,sdf")]
+    #[arg(
+        long,
+        value_name = "A,B",
+        value_delimiter = ',',
+        default_value = "inside,sdf"
+    )]
     pub(super) columns: Vec<Column>,
 }
 
@@ -173,8 +190,14 @@ pub(super) enum Kind {
 /// A number of bytes: a number and a unit, 1024-based for KiB, MiB, GiB, TiB and the bare letters,
 /// 1000-based for kB, MB, GB, TB.
 fn parse_size(text: &str) -> Result<u64, String> {
-    let wanted = || format!("{text:?} is not a size; write bytes, or a number with KiB, MiB, GiB, TiB, K, M, G, T, kB, MB, GB or TB");
-    let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let wanted = || {
+        format!(
+            "{text:?} is not a size; write bytes, or a number with KiB, MiB, GiB, TiB, K, M, G, T, kB, MB, GB or TB"
+        )
+    };
+    let split = text
+        .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
     let number: f64 = number.parse().map_err(|_| wanted())?;
     let factor = match unit.trim() {
@@ -193,7 +216,11 @@ fn parse_size(text: &str) -> Result<u64, String> {
     if !(bytes >= 1.0 && bytes < 9e18) {
         return Err(wanted());
     }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked just above"
+    )]
     Ok(bytes as u64)
 }
 

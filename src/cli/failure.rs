@@ -5,7 +5,9 @@ use super::output::{self, Console};
 use crate::error::Error;
 use crate::io::IoErrorKind;
 use crate::scene::SceneError;
-use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
+use miette::{
+    Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode,
+};
 use std::process::ExitCode;
 
 /// Why a command ended without its result.
@@ -64,7 +66,11 @@ impl Failure {
     /// Tells the user, and gives the exit code.
     pub(super) fn report(&self, console: &Console) -> ExitCode {
         use std::io::Write;
-        let label = if console.colored() { "\u{1b}[1;31merror\u{1b}[0m" } else { "error" };
+        let label = if console.colored() {
+            "\u{1b}[1;31merror\u{1b}[0m"
+        } else {
+            "error"
+        };
         let mut text = format!("{label}: {}\n", self.message());
         if let Self::Library(Error::Scene(scene)) = self {
             text.push_str(&excerpt(scene, console.colored()));
@@ -104,17 +110,31 @@ impl Diagnostic for Excerpt {
 }
 
 fn excerpt(error: &SceneError, colored: bool) -> String {
-    let (Some(problem), Some((text, span))) = (error.problem(), error.source_text()) else { return String::new() };
+    let (Some(problem), Some((text, span))) = (error.problem(), error.source_text()) else {
+        return String::new();
+    };
     // A span over many lines is marked at its first.
-    let end = text[span.clone()].find('\n').map_or(span.end, |n| span.start + n);
+    let end = text[span.clone()]
+        .find('\n')
+        .map_or(span.end, |n| span.start + n);
     let shown = Excerpt {
         message: format!("wanted {}", problem.wanted),
         source_text: NamedSource::new(&problem.source_name, text.to_owned()),
-        label: LabeledSpan::new_with_span(Some(format!("wanted {}", problem.wanted)), span.start..end),
+        label: LabeledSpan::new_with_span(
+            Some(format!("wanted {}", problem.wanted)),
+            span.start..end,
+        ),
     };
-    let theme = if colored { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+    let theme = if colored {
+        GraphicalTheme::unicode()
+    } else {
+        GraphicalTheme::unicode_nocolor()
+    };
     let mut out = String::new();
-    match GraphicalReportHandler::new_themed(theme).with_width(120).render_report(&mut out, &shown) {
+    match GraphicalReportHandler::new_themed(theme)
+        .with_width(120)
+        .render_report(&mut out, &shown)
+    {
         Ok(()) => out,
         Err(_) => String::new(),
     }

@@ -10,7 +10,9 @@ use std::process::ExitCode;
 pub(super) fn run(arguments: &Generate) -> Result<ExitCode, Failure> {
     let mut bytes = Vec::new();
     let mut command = Arguments::command();
-    let mut complete = |shell: Shell| clap_complete::generate(shell, &mut Arguments::command(), "voxlathe", &mut bytes);
+    let mut complete = |shell: Shell| {
+        clap_complete::generate(shell, &mut Arguments::command(), "voxlathe", &mut bytes)
+    };
     match arguments.kind {
         Kind::Bash => complete(Shell::Bash),
         Kind::Zsh => complete(Shell::Zsh),
@@ -30,7 +32,11 @@ pub(super) fn run(arguments: &Generate) -> Result<ExitCode, Failure> {
 fn render_man(command: &clap::Command, out: &mut Vec<u8>) -> std::io::Result<()> {
     clap_mangen::Man::new(command.clone()).render(out)?;
     for sub in command.get_subcommands().filter(|s| s.get_name() != "help") {
-        clap_mangen::Man::new(sub.clone().display_name(format!("voxlathe {}", sub.get_name()))).render(out)?;
+        clap_mangen::Man::new(
+            sub.clone()
+                .display_name(format!("voxlathe {}", sub.get_name())),
+        )
+        .render(out)?;
     }
     Ok(())
 }

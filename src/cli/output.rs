@@ -18,9 +18,16 @@ impl Console {
         let colored = match common.color {
             Color::Always => true,
             Color::Never => false,
-            Color::Auto => std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()),
+            Color::Auto => {
+                std::io::stderr().is_terminal()
+                    && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
+            }
         };
-        Self { json: common.json, quiet: common.quiet, colored }
+        Self {
+            json: common.json,
+            quiet: common.quiet,
+            colored,
+        }
     }
 
     pub(super) fn json(&self) -> bool {
@@ -40,7 +47,11 @@ impl Console {
     }
 
     pub(super) fn warn(&self, text: &str) {
-        let label = if self.colored { "\u{1b}[1;33mwarning\u{1b}[0m" } else { "warning" };
+        let label = if self.colored {
+            "\u{1b}[1;33mwarning\u{1b}[0m"
+        } else {
+            "warning"
+        };
         self.say(&format!("{label}: {text}"));
     }
 
@@ -58,9 +69,15 @@ impl Console {
     /// A bar that counts to `length`; hidden where nobody watches.
     pub(super) fn bar(&self, length: u64, unit: &str) -> ProgressBar {
         let hidden = self.quiet || !std::io::stderr().is_terminal();
-        let target = if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let target = if hidden {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        };
         let bar = ProgressBar::with_draw_target(Some(length), target);
-        if let Ok(style) = ProgressStyle::with_template(&format!("{{bar:40}} {{pos}}/{{len}} {unit}  {{eta}} left")) {
+        if let Ok(style) = ProgressStyle::with_template(&format!(
+            "{{bar:40}} {{pos}}/{{len}} {unit}  {{eta}} left"
+        )) {
             bar.set_style(style);
         }
         bar
@@ -86,5 +103,9 @@ pub(super) fn bytes(n: u64) -> String {
         value /= 1024.0;
         unit += 1;
     }
-    if unit == 0 { format!("{n} bytes") } else { format!("{value:.1} {}", UNITS[unit]) }
+    if unit == 0 {
+        format!("{n} bytes")
+    } else {
+        format!("{value:.1} {}", UNITS[unit])
+    }
 }

@@ -14,7 +14,11 @@ use std::process::ExitCode;
 /// Points between two looks at the interrupt flag.
 const CHUNK: usize = 4096;
 
-pub(super) fn run(arguments: &Query, common: &Common, console: &Console) -> Result<ExitCode, Failure> {
+pub(super) fn run(
+    arguments: &Query,
+    common: &Common,
+    console: &Console,
+) -> Result<ExitCode, Failure> {
     let scene = Scene::load_with(&arguments.scene, &common.set)?;
     for warning in scene.warnings() {
         console.warn(warning);
@@ -37,7 +41,10 @@ pub(super) fn run(arguments: &Query, common: &Common, console: &Console) -> Resu
         .concat();
     bar.finish_and_clear();
     // The sign is that of the membership, so the one column follows from the other.
-    let inside: Vec<f64> = distances.iter().map(|&d| f64::from(u8::from(d <= 0.0))).collect();
+    let inside: Vec<f64> = distances
+        .iter()
+        .map(|&d| f64::from(u8::from(d <= 0.0)))
+        .collect();
     let columns: Vec<(&str, &[f64])> = arguments
         .columns
         .iter()
@@ -52,7 +59,11 @@ pub(super) fn run(arguments: &Query, common: &Common, console: &Console) -> Resu
     }
     if console.json() {
         let names: Vec<&str> = columns.iter().map(|c| c.0).collect();
-        let rows = arguments.output.is_none().then(|| (0..points.len()).map(|i| columns.iter().map(|c| c.1[i]).collect::<Vec<_>>()).collect::<Vec<_>>());
+        let rows = arguments.output.is_none().then(|| {
+            (0..points.len())
+                .map(|i| columns.iter().map(|c| c.1[i]).collect::<Vec<_>>())
+                .collect::<Vec<_>>()
+        });
         let document = json!({
             "points": points.len(),
             "inside": count,

@@ -6,10 +6,12 @@ use super::interrupt;
 use super::output::{self, Console};
 use crate::error::Error;
 use crate::grid::GridSpec;
+use crate::io::available_bytes;
 use crate::io::exr::{Compression, LayerChannels, SampleKind};
 use crate::io::manifest::Manifest;
-use crate::io::stack::{ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes};
-use crate::io::available_bytes;
+use crate::io::stack::{
+    ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
+};
 use crate::sample::{Channel, LayerBuffers, LayerSampler, Selection};
 use crate::scene::{ChannelName, CompressionName, FormatName, GridStep, Scene};
 use serde_json::{Value, json};
@@ -40,7 +42,11 @@ struct Seconds {
     total: f64,
 }
 
-pub(super) fn run(arguments: &Voxelize, common: &Common, console: &Console) -> Result<ExitCode, Failure> {
+pub(super) fn run(
+    arguments: &Voxelize,
+    common: &Common,
+    console: &Console,
+) -> Result<ExitCode, Failure> {
     let start = Instant::now();
     let mut scene = Scene::load_with(&arguments.scene, &common.set)?;
     apply_flags(&mut scene, arguments)?;
@@ -55,28 +61,57 @@ pub(super) fn run(arguments: &Voxelize, common: &Common, console: &Console) -> R
     }
     let options = StackOptions {
         units: scene.model().units.name().to_owned(),
-        scene: Some(SceneLabel { name: scene.name().to_owned(), hash: scene.hash() }),
+        scene: Some(SceneLabel {
+            name: scene.name().to_owned(),
+            hash: scene.hash(),
+        }),
         compression: plan.compression,
         force: arguments.force,
     };
-    let writer = StackWriter::create(&arguments.output, &plan.grid, plan.channels.clone(), options)?;
+    let writer = StackWriter::create(
+        &arguments.output,
+        &plan.grid,
+        plan.channels.clone(),
+        options,
+    )?;
     let (sample, write) = stream(&scene, &plan, &writer, console)?;
     let manifest = writer.finish(summary(&scene))?;
-    let seconds = Seconds { prepare, sample, write, total: start.elapsed().as_secs_f64() };
-    console.result(&document(&scene, &plan, Some(&manifest), Some(&seconds)), &report(&scene, arguments, &manifest, &seconds))?;
+    let seconds = Seconds {
+        prepare,
+        sample,
+        write,
+        total: start.elapsed().as_secs_f64(),
+    };
+    console.result(
+        &document(&scene, &plan, Some(&manifest), Some(&seconds)),
+        &report(&scene, arguments, &manifest, &seconds),
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Puts the command's flags in place of the scene's own choices.
 fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
-    fn names<T: Copy + PartialEq>(given: &[String], flag: &str, all: &[T], name: fn(T) -> &'static str, from: fn(&str) -> Option<T>) -> Result<Vec<T>, Failure> {
+    fn names<T: Copy + PartialEq>(
+        given: &[String],
+        flag: &str,
+        all: &[T],
+        name: fn(T) -> &'static str,
+        from: fn(&str) -> Option<T>,
+    ) -> Result<Vec<T>, Failure> {
         let mut chosen = Vec::new();
         for text in given {
             let Some(value) = from(text) else {
                 let all: Vec<&str> = all.iter().map(|&v| name(v)).collect();
-                let nearest = all.iter().max_by(|a, b| strsim::jaro_winkler(a, text).total_cmp(&strsim::jaro_winkler(b, text)));
-                let hint = nearest.filter(|n| strsim::jaro_winkler(n, text) > 0.7).map_or_else(String::new, |n| format!("; did you mean {n}?"));
-                return Err(Failure::usage(format!("{flag}: {text:?} is not one of {}{hint}", all.join(", "))));
+                let nearest = all.iter().max_by(|a, b| {
+                    strsim::jaro_winkler(a, text).total_cmp(&strsim::jaro_winkler(b, text))
+                });
+                let hint = nearest
+                    .filter(|n| strsim::jaro_winkler(n, text) > 0.7)
+                    .map_or_else(String::new, |n| format!("; did you mean {n}?"));
+                return Err(Failure::usage(format!(
+                    "{flag}: {text:?} is not one of {}{hint}",
+                    all.join(", ")
+                )));
             };
             if chosen.contains(&value) {
                 return Err(Failure::usage(format!("{flag}: {text:?} is given twice")));
@@ -90,30 +125,59 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         [] => {}
         [n] if n > 0 => grid.step = GridStep::Resolution(n),
         [x, y, z] if x > 0 && y > 0 && z > 0 => grid.step = GridStep::Resolutions([x, y, z]),
-        ref other => return Err(Failure::usage(format!("--resolution: {other:?} is not one number or three, each at least 1"))),
+        ref other => {
+            return Err(Failure::usage(format!(
+                "--resolution: {other:?} is not one number or three, each at least 1"
+            )));
+        }
     }
     let size = |v: f64| v.is_finite() && v > 0.0;
     match *arguments.spacing.as_slice() {
         [] => {}
         [d] if size(d) => grid.step = GridStep::Spacing([d; 3]),
         [x, y, z] if size(x) && size(y) && size(z) => grid.step = GridStep::Spacing([x, y, z]),
-        ref other => return Err(Failure::usage(format!("--spacing: {other:?} is not one number or three, each finite and greater than 0"))),
+        ref other => {
+            return Err(Failure::usage(format!(
+                "--spacing: {other:?} is not one number or three, each finite and greater than 0"
+            )));
+        }
     }
-    let channels = names(&arguments.channels, "--channels", ChannelName::ALL, ChannelName::name, ChannelName::from_name)?;
+    let channels = names(
+        &arguments.channels,
+        "--channels",
+        ChannelName::ALL,
+        ChannelName::name,
+        ChannelName::from_name,
+    )?;
     if !channels.is_empty() {
         output.channels = channels;
     }
-    let formats = names(&arguments.formats, "--formats", FormatName::ALL, FormatName::name, FormatName::from_name)?;
+    let formats = names(
+        &arguments.formats,
+        "--formats",
+        FormatName::ALL,
+        FormatName::name,
+        FormatName::from_name,
+    )?;
     if !formats.is_empty() {
         output.formats = formats;
     }
     let compression: Vec<String> = arguments.compression.iter().cloned().collect();
-    if let [kind] = names(&compression, "--compression", CompressionName::ALL, CompressionName::name, CompressionName::from_name)?[..] {
+    if let [kind] = names(
+        &compression,
+        "--compression",
+        CompressionName::ALL,
+        CompressionName::name,
+        CompressionName::from_name,
+    )?[..]
+    {
         output.compression = kind;
     }
     if let Some(band) = arguments.band {
         if !size(band) {
-            return Err(Failure::usage(format!("--band: {band} is not a finite number greater than 0")));
+            return Err(Failure::usage(format!(
+                "--band: {band} is not a finite number greater than 0"
+            )));
         }
         output.band = Some(band);
     }
@@ -124,7 +188,11 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
     let grid = scene.grid()?;
     let output = &scene.model().output;
     let units = scene.model().units.name();
-    let channels: Vec<ChannelSpec> = output.channels.iter().map(|&c| ChannelSpec::named(c.name(), kind(c), units)).collect();
+    let channels: Vec<ChannelSpec> = output
+        .channels
+        .iter()
+        .map(|&c| ChannelSpec::named(c.name(), kind(c), units))
+        .collect();
     let wanted: Vec<Channel> = output.channels.iter().map(|&c| channel(c)).collect();
     let selection = Selection::of(&wanted, scene.band(&grid));
     if selection.sdf {
@@ -152,11 +220,24 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
         }
         .into());
     }
-    #[allow(clippy::cast_possible_truncation, reason = "not more than the number of threads")]
-    let workers = (limit / layer_bytes.max(1)).min(rayon::current_num_threads() as u64).max(1) as usize;
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "not more than the number of threads"
+    )]
+    let workers = (limit / layer_bytes.max(1))
+        .min(rayon::current_num_threads() as u64)
+        .max(1) as usize;
     let stack_bytes = largest_stack_bytes(&grid, &channels);
     check_disk(arguments, compression, stack_bytes)?;
-    Ok(Plan { grid, selection, channels, compression, workers, layer_bytes, stack_bytes })
+    Ok(Plan {
+        grid,
+        selection,
+        channels,
+        compression,
+        workers,
+        layer_bytes,
+        stack_bytes,
+    })
 }
 
 fn channel(name: ChannelName) -> Channel {
@@ -179,16 +260,30 @@ fn kind(name: ChannelName) -> SampleKind {
 /// Half of the machine's memory, or 2 GiB where it does not tell.
 fn default_memory_limit() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total = text.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+    let total = text.lines().find_map(|l| {
+        l.strip_prefix("MemTotal:")?
+            .trim()
+            .strip_suffix(" kB")?
+            .parse::<u64>()
+            .ok()
+    });
     total.map_or(2 << 30, |kib| kib * 1024 / 2)
 }
 
 /// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand:
 /// what remains of the samples at best is assumed there.
-fn check_disk(arguments: &Voxelize, compression: Compression, stack_bytes: u64) -> Result<(), Failure> {
+fn check_disk(
+    arguments: &Voxelize,
+    compression: Compression,
+    stack_bytes: u64,
+) -> Result<(), Failure> {
     /// The best ratio deflate reaches, on a constant layer.
     const BEST: u64 = 1000;
-    let needed = if compression == Compression::None { stack_bytes } else { stack_bytes / BEST };
+    let needed = if compression == Compression::None {
+        stack_bytes
+    } else {
+        stack_bytes / BEST
+    };
     let available = available_bytes(&arguments.output)?;
     if needed > available {
         return Err(Error::TooLarge {
@@ -210,17 +305,32 @@ fn check_f32_range(scene: &Scene, grid: &GridSpec) -> Result<(), Error> {
     let reach = (high.max(bounds.max) - low.min(bounds.min)).length();
     let units = scene.model().units.name();
     if !(reach < 1e38) {
-        return Err(Error::Range { what: "the grid's diagonal", found: reach, units, wanted: "less than 1e38" });
+        return Err(Error::Range {
+            what: "the grid's diagonal",
+            found: reach,
+            units,
+            wanted: "less than 1e38",
+        });
     }
     let spacing = grid.spacing().min_element();
     if !(spacing > 1e-30) {
-        return Err(Error::Range { what: "the spacing", found: spacing, units, wanted: "more than 1e-30" });
+        return Err(Error::Range {
+            what: "the spacing",
+            found: spacing,
+            units,
+            wanted: "more than 1e-30",
+        });
     }
     Ok(())
 }
 
 /// Samples and writes layer by layer; each worker holds one layer at a time.
-fn stream(scene: &Scene, plan: &Plan, writer: &StackWriter, console: &Console) -> Result<(f64, f64), Failure> {
+fn stream(
+    scene: &Scene,
+    plan: &Plan,
+    writer: &StackWriter,
+    console: &Console,
+) -> Result<(f64, f64), Failure> {
     let sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection);
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
@@ -242,7 +352,10 @@ fn stream(scene: &Scene, plan: &Plan, writer: &StackWriter, console: &Console) -
         };
         writer.write_layer(k, &layer)?;
         for (total, time) in nanoseconds.iter().zip([sampled - begin, sampled.elapsed()]) {
-            total.fetch_add(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX), Ordering::Relaxed);
+            total.fetch_add(
+                u64::try_from(time.as_nanos()).unwrap_or(u64::MAX),
+                Ordering::Relaxed,
+            );
         }
         bar.inc(1);
         Ok(())
@@ -258,7 +371,9 @@ fn stream(scene: &Scene, plan: &Plan, writer: &StackWriter, console: &Console) -
                     }
                     if let Err(error) = work(&mut buffers, k) {
                         failed.store(true, Ordering::Relaxed);
-                        let mut first = failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                        let mut first = failure
+                            .lock()
+                            .unwrap_or_else(std::sync::PoisonError::into_inner);
                         first.get_or_insert(error);
                     }
                 }
@@ -266,7 +381,10 @@ fn stream(scene: &Scene, plan: &Plan, writer: &StackWriter, console: &Console) -
         }
     });
     bar.finish_and_clear();
-    if let Some(error) = failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+    if let Some(error) = failure
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+    {
         return Err(error.into());
     }
     // Thread time over the number of workers: the share of the wall time each stage took.
@@ -301,7 +419,12 @@ fn summary(scene: &Scene) -> StackSummary {
     }
 }
 
-fn document(scene: &Scene, plan: &Plan, manifest: Option<&Manifest>, seconds: Option<&Seconds>) -> Value {
+fn document(
+    scene: &Scene,
+    plan: &Plan,
+    manifest: Option<&Manifest>,
+    seconds: Option<&Seconds>,
+) -> Value {
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
     json!({
         "scene": scene.name(),
@@ -327,8 +450,19 @@ fn document(scene: &Scene, plan: &Plan, manifest: Option<&Manifest>, seconds: Op
     })
 }
 
-fn dry_run(scene: &Scene, plan: &Plan, arguments: &Voxelize, prepare: f64, console: &Console) -> Result<ExitCode, Failure> {
-    let seconds = Seconds { prepare, sample: 0.0, write: 0.0, total: prepare };
+fn dry_run(
+    scene: &Scene,
+    plan: &Plan,
+    arguments: &Voxelize,
+    prepare: f64,
+    console: &Console,
+) -> Result<ExitCode, Failure> {
+    let seconds = Seconds {
+        prepare,
+        sample: 0.0,
+        write: 0.0,
+        total: prepare,
+    };
     let [nx, ny, nz] = plan.grid.dims();
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
     let text = format!(
@@ -348,7 +482,12 @@ fn report(scene: &Scene, arguments: &Voxelize, manifest: &Manifest, seconds: &Se
     let [nx, ny, nz] = manifest.grid.dims;
     let units = scene.model().units.name();
     let bytes: u64 = manifest.files.iter().map(|f| f.bytes).sum();
-    let mut text = format!("{}: {nx} x {ny} x {nz} voxels in {}, {}\n", scene.name(), arguments.output.display(), output::bytes(bytes));
+    let mut text = format!(
+        "{}: {nx} x {ny} x {nz} voxels in {}, {}\n",
+        scene.name(),
+        arguments.output.display(),
+        output::bytes(bytes)
+    );
     let mut volume = |label: &str, v: Option<f64>| {
         if let Some(v) = v {
             // Writing to a string does not fail.
@@ -358,13 +497,23 @@ fn report(scene: &Scene, arguments: &Voxelize, manifest: &Manifest, seconds: &Se
     volume("by occupancy", manifest.volume_occupancy);
     volume("by fraction", manifest.volume_fraction);
     volume("exact", manifest.volume_exact);
-    let _ = writeln!(text, "{:.2} s (sampling {:.2}, writing {:.2})", seconds.total, seconds.sample, seconds.write);
+    let _ = writeln!(
+        text,
+        "{:.2} s (sampling {:.2}, writing {:.2})",
+        seconds.total, seconds.sample, seconds.write
+    );
     text
 }
 
 /// The process's largest resident size, where the system tells.
 fn peak_memory() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let kib: u64 = text.lines().find_map(|l| l.strip_prefix("VmHWM:"))?.trim().strip_suffix(" kB")?.parse().ok()?;
+    let kib: u64 = text
+        .lines()
+        .find_map(|l| l.strip_prefix("VmHWM:"))?
+        .trim()
+        .strip_suffix(" kB")?
+        .parse()
+        .ok()?;
     Some(kib * 1024)
 }

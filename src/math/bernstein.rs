@@ -146,7 +146,9 @@ pub fn quotient_derivative<T: Real>(a: &[T], w: &[T]) -> Coefficients<T> {
 /// list ascends. A polynomial that vanishes to rounding has none.
 #[must_use]
 pub fn sign_change_parameters(coefficients: &[Dd]) -> Vec<Dd> {
-    let scale = coefficients.iter().fold(0.0_f64, |m, c| m.max(c.f64().abs()));
+    let scale = coefficients
+        .iter()
+        .fold(0.0_f64, |m, c| m.max(c.f64().abs()));
     let mut found = Vec::new();
     if scale > 0.0 && scale.is_finite() {
         // Below this a coefficient is rounding of the products that made it.
@@ -213,7 +215,11 @@ fn bracketed_root(c: &[Dd]) -> Dd {
             break;
         }
         let newton = t - step;
-        t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
+        t = if newton > lo && newton < hi {
+            newton
+        } else {
+            (lo + hi) * Dd::of(0.5)
+        };
     }
     t
 }
@@ -257,11 +263,20 @@ mod tests {
     #[test]
     fn clustered_and_double_roots_are_separated_or_harmless() {
         let found = sign_change_parameters(&from_roots(&[0.5, 0.5 + 1e-9, 0.5 + 2e-9]));
-        assert!(found.iter().any(|t| (t.f64() - 0.5).abs() < 1e-10), "{found:?}");
-        assert!(found.iter().any(|t| (t.f64() - 0.5 - 2e-9).abs() < 1e-10), "{found:?}");
+        assert!(
+            found.iter().any(|t| (t.f64() - 0.5).abs() < 1e-10),
+            "{found:?}"
+        );
+        assert!(
+            found.iter().any(|t| (t.f64() - 0.5 - 2e-9).abs() < 1e-10),
+            "{found:?}"
+        );
         // A double root changes no sign; extra parameters there are allowed, missing ones are not.
         let found = sign_change_parameters(&from_roots(&[0.25, 0.25, 0.75]));
-        assert!(found.iter().any(|t| (t.f64() - 0.75).abs() < 1e-20), "{found:?}");
+        assert!(
+            found.iter().any(|t| (t.f64() - 0.75).abs() < 1e-20),
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -144,7 +144,10 @@ impl Dd {
     #[must_use]
     #[inline]
     pub fn scale_by_power_of_two(self, power: f64) -> Self {
-        Self { hi: self.hi * power, lo: self.lo * power }
+        Self {
+            hi: self.hi * power,
+            lo: self.lo * power,
+        }
     }
 
     /// The non-negative square root; 0 for a number below 0.
@@ -206,7 +209,10 @@ impl Neg for Dd {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
-        Self { hi: -self.hi, lo: -self.lo }
+        Self {
+            hi: -self.hi,
+            lo: -self.lo,
+        }
     }
 }
 
@@ -268,7 +274,12 @@ mod tests {
     type Big = FBig<dashu_float::round::mode::HalfEven, 2>;
 
     fn big(x: Dd) -> Big {
-        let f = |v: f64| Big::try_from(v).expect("finite").with_precision(300).value();
+        let f = |v: f64| {
+            Big::try_from(v)
+                .expect("finite")
+                .with_precision(300)
+                .value()
+        };
         f(x.hi) + f(x.lo)
     }
 
@@ -302,9 +313,20 @@ mod tests {
 
     #[test]
     fn right_angles_are_exact() {
-        for (degrees, s, c) in [(0.0, 0.0, 1.0), (90.0, 1.0, 0.0), (180.0, 0.0, -1.0), (270.0, -1.0, 0.0), (-90.0, -1.0, 0.0), (450.0, 1.0, 0.0)] {
+        for (degrees, s, c) in [
+            (0.0, 0.0, 1.0),
+            (90.0, 1.0, 0.0),
+            (180.0, 0.0, -1.0),
+            (270.0, -1.0, 0.0),
+            (-90.0, -1.0, 0.0),
+            (450.0, 1.0, 0.0),
+        ] {
             let (sin, cos) = Dd::of(degrees).sin_cos_degrees();
-            assert_eq!((sin.f64(), cos.f64(), sin.lo, cos.lo), (s, c, 0.0, 0.0), "{degrees} degrees");
+            assert_eq!(
+                (sin.f64(), cos.f64(), sin.lo, cos.lo),
+                (s, c, 0.0, 0.0),
+                "{degrees} degrees"
+            );
         }
     }
 
@@ -319,7 +341,10 @@ mod tests {
             let a = Dd::of(f64::from(i) * 0.7 - 250.0);
             let (s, c) = a.sin_cos_degrees();
             assert!((s * s + c * c - Dd::ONE).abs().f64() < 1e-30, "at {a:?}");
-            assert!((s.f64() - a.hi.to_radians().sin()).abs() < 1e-14, "at {a:?}");
+            assert!(
+                (s.f64() - a.hi.to_radians().sin()).abs() < 1e-14,
+                "at {a:?}"
+            );
         }
     }
 }

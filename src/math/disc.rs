@@ -20,8 +20,13 @@ pub type Polygon = SmallVec<[DVec2; 10]>;
 /// Area of a polygon, positive when counter-clockwise.
 #[must_use]
 pub fn polygon_area(polygon: &[DVec2]) -> f64 {
-    let Some((&o, rest)) = polygon.split_first() else { return 0.0 };
-    0.5 * rest.windows(2).map(|w| (w[0] - o).perp_dot(w[1] - o)).sum::<f64>()
+    let Some((&o, rest)) = polygon.split_first() else {
+        return 0.0;
+    };
+    0.5 * rest
+        .windows(2)
+        .map(|w| (w[0] - o).perp_dot(w[1] - o))
+        .sum::<f64>()
 }
 
 /// α - sin α for 0 <= α <= 2π.
@@ -31,7 +36,10 @@ fn angle_less_sine(a: f64) -> f64 {
     }
     let a2 = a * a;
     // Six terms leave 0.5^14 / 15! of the first, below one rounding.
-    a * a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0 * (1.0 - a2 / 110.0 * (1.0 - a2 / 156.0)))))
+    a * a2 / 6.0
+        * (1.0
+            - a2 / 20.0
+                * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0 * (1.0 - a2 / 110.0 * (1.0 - a2 / 156.0)))))
 }
 
 /// Area of the circular segment cut off by the chord from `p` to `q`, both on the circle of radius
@@ -83,12 +91,24 @@ pub fn polygon_disc_area(polygon: &[DVec2], r: f64) -> f64 {
         let half = half2.sqrt();
         let (s0, s1) = ((foot - half).max(0.0), (foot + half).min(1.0));
         if s0 < s1 {
-            let at = |s: f64| if s <= 0.0 { a } else if s >= 1.0 { b } else { a + d * s };
+            let at = |s: f64| {
+                if s <= 0.0 {
+                    a
+                } else if s >= 1.0 {
+                    b
+                } else {
+                    a + d * s
+                }
+            };
             parts.push((at(s0), at(s1)));
         }
     }
     let Some(&(origin, _)) = parts.first() else {
-        return if holds_origin { std::f64::consts::PI * r2 } else { 0.0 };
+        return if holds_origin {
+            std::f64::consts::PI * r2
+        } else {
+            0.0
+        };
     };
     let mut area = 0.0;
     for (i, &(p, q)) in parts.iter().enumerate() {
@@ -125,7 +145,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn rectangle(x0: f64, y0: f64, x1: f64, y1: f64) -> Polygon {
-        [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].into_iter().map(|(x, y)| DVec2::new(x, y)).collect()
+        [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+            .into_iter()
+            .map(|(x, y)| DVec2::new(x, y))
+            .collect()
     }
 
     /// The same area as an integral over x of the length of the vertical line inside both.
@@ -136,7 +159,11 @@ mod tests {
         };
         // Beyond the disc the columns are empty.
         let (from, to) = (x0.max(-r), x1.min(r));
-        if from < to { integrate(column, from, to, 1e-10, 4000).value } else { 0.0 }
+        if from < to {
+            integrate(column, from, to, 1e-10, 4000).value
+        } else {
+            0.0
+        }
     }
 
     proptest! {
@@ -161,8 +188,14 @@ mod tests {
 
     #[test]
     fn discs_within_polygons_and_polygons_within_discs() {
-        assert_eq!(polygon_disc_area(&rectangle(-2.0, -2.0, 2.0, 2.0), 1.0), std::f64::consts::PI);
-        assert_eq!(polygon_disc_area(&rectangle(-0.5, -0.5, 0.5, 0.5), 1.0), 1.0);
+        assert_eq!(
+            polygon_disc_area(&rectangle(-2.0, -2.0, 2.0, 2.0), 1.0),
+            std::f64::consts::PI
+        );
+        assert_eq!(
+            polygon_disc_area(&rectangle(-0.5, -0.5, 0.5, 0.5), 1.0),
+            1.0
+        );
         assert_eq!(polygon_disc_area(&rectangle(3.0, -0.5, 4.0, 0.5), 1.0), 0.0);
         assert_eq!(polygon_disc_area(&rectangle(3.0, 1.5, 4.0, 2.5), 1.0), 0.0);
         let half = clip_left(&rectangle(-2.0, -2.0, 2.0, 2.0), DVec2::X);

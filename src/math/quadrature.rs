@@ -57,12 +57,21 @@ pub fn panel(f: &mut impl FnMut(f64) -> f64, a: f64, b: f64) -> Integral {
             gauss += GAUSS[i / 2] * pair;
         }
     }
-    Integral { value: kronrod * h, error: ((kronrod - gauss) * h).abs() }
+    Integral {
+        value: kronrod * h,
+        error: ((kronrod - gauss) * h).abs(),
+    }
 }
 
 /// Integral of `f` over [a, b] with an estimated absolute error of at most `tolerance`, or the
 /// best that `max_panels` panels reach; the estimate tells.
-pub fn integrate(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, tolerance: f64, max_panels: usize) -> Integral {
+pub fn integrate(
+    mut f: impl FnMut(f64) -> f64,
+    a: f64,
+    b: f64,
+    tolerance: f64,
+    max_panels: usize,
+) -> Integral {
     let first = panel(&mut f, a, b);
     if first.error <= tolerance || max_panels < 2 {
         return first;
@@ -73,7 +82,8 @@ pub fn integrate(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, tolerance: f64, 
         if total <= tolerance {
             break;
         }
-        let worst = (0..panels.len()).max_by(|&i, &j| panels[i].2.error.total_cmp(&panels[j].2.error));
+        let worst =
+            (0..panels.len()).max_by(|&i, &j| panels[i].2.error.total_cmp(&panels[j].2.error));
         let Some(worst) = worst else { break };
         let (a, b, _) = panels[worst];
         let c = 0.5 * (a + b);
@@ -85,7 +95,10 @@ pub fn integrate(mut f: impl FnMut(f64) -> f64, a: f64, b: f64, tolerance: f64, 
     }
     // Summed from left to right, so the order of refinement does not show.
     panels.sort_by(|p, q| p.0.total_cmp(&q.0));
-    panels.iter().fold(Integral::default(), |sum, p| Integral { value: sum.value + p.2.value, error: sum.error + p.2.error })
+    panels.iter().fold(Integral::default(), |sum, p| Integral {
+        value: sum.value + p.2.value,
+        error: sum.error + p.2.error,
+    })
 }
 
 #[cfg(test)]
@@ -97,21 +110,37 @@ mod tests {
         for degree in 0..=22 {
             let got = panel(&mut |x: f64| x.powi(degree), 0.0, 2.0);
             let want = 2f64.powi(degree + 1) / f64::from(degree + 1);
-            assert!((got.value - want).abs() <= 1e-14 * want, "degree {degree}: {} for {want}", got.value);
+            assert!(
+                (got.value - want).abs() <= 1e-14 * want,
+                "degree {degree}: {} for {want}",
+                got.value
+            );
         }
     }
 
     #[test]
     fn the_estimate_covers_the_true_error() {
         let cases: [(&str, fn(f64) -> f64, f64); 3] = [
-            ("quarter circle", |x| (1.0 - x * x).sqrt(), std::f64::consts::FRAC_PI_4),
+            (
+                "quarter circle",
+                |x| (1.0 - x * x).sqrt(),
+                std::f64::consts::FRAC_PI_4,
+            ),
             ("kink", |x| (x - 0.3).abs(), 0.29),
-            ("peak", |x| 1.0 / (1e-4 + (x - 0.4) * (x - 0.4)), 100.0 * (60f64.atan() + 40f64.atan())),
+            (
+                "peak",
+                |x| 1.0 / (1e-4 + (x - 0.4) * (x - 0.4)),
+                100.0 * (60f64.atan() + 40f64.atan()),
+            ),
         ];
         for (name, f, want) in cases {
             let got = integrate(f, 0.0, 1.0, 1e-9, 400);
             assert!(got.error <= 1e-9, "{name}: estimate {}", got.error);
-            assert!((got.value - want).abs() <= got.error.max(1e-14 * want), "{name}: {} for {want}", got.value);
+            assert!(
+                (got.value - want).abs() <= got.error.max(1e-14 * want),
+                "{name}: {} for {want}",
+                got.value
+            );
         }
     }
 }

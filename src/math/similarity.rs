@@ -46,7 +46,11 @@ pub fn dot(a: DdVec, b: DdVec) -> Dd {
 /// Cross product.
 #[must_use]
 pub fn cross(a: DdVec, b: DdVec) -> DdVec {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 /// The unit vector along `v`, exact where only one component is not zero. `None` for zero.
@@ -71,14 +75,22 @@ impl Similarity {
         let e3 = unit(direction)?;
         let x = unit(x)?;
         let along = dot(x, e3);
-        let flat = [x[0] - along * e3[0], x[1] - along * e3[1], x[2] - along * e3[2]];
+        let flat = [
+            x[0] - along * e3[0],
+            x[1] - along * e3[1],
+            x[2] - along * e3[2],
+        ];
         let length = dot(flat, flat).sqrt();
         // Both are unit vectors, so this is the sine of the angle between them.
         if !(length.f64() > 1e-12) {
             return None;
         }
         let e1 = flat.map(|c| c / length);
-        Some(Self::new([e1, cross(e3, e1), e3], origin.to_array().map(Dd::of), Dd::ONE))
+        Some(Self::new(
+            [e1, cross(e3, e1), e3],
+            origin.to_array().map(Dd::of),
+            Dd::ONE,
+        ))
     }
 
     fn new(columns: [DdVec; 3], origin: DdVec, scale: Dd) -> Self {
@@ -87,10 +99,19 @@ impl Similarity {
         for i in 0..3 {
             let row = columns[i].map(|c| c / scale);
             rows[i] = row.map(Real::f64);
-            let power_of_two = |v: f64| v == 0.0 || v.abs().log2().fract() == 0.0 && v.abs() == v.abs().log2().exp2();
-            exact[i] = row.iter().all(|c| c.lo() == 0.0 && power_of_two(c.hi())) && row.iter().filter(|c| c.hi() != 0.0).count() == 1;
+            let power_of_two = |v: f64| {
+                v == 0.0 || v.abs().log2().fract() == 0.0 && v.abs() == v.abs().log2().exp2()
+            };
+            exact[i] = row.iter().all(|c| c.lo() == 0.0 && power_of_two(c.hi()))
+                && row.iter().filter(|c| c.hi() != 0.0).count() == 1;
         }
-        Self { columns, origin, scale, rows, exact }
+        Self {
+            columns,
+            origin,
+            scale,
+            rows,
+            exact,
+        }
     }
 
     /// Follows this map by a scaling about the world origin.
@@ -131,7 +152,11 @@ impl Similarity {
             }
             out
         };
-        Some(Self::new(self.columns.map(turn), turn(self.origin), self.scale))
+        Some(Self::new(
+            self.columns.map(turn),
+            turn(self.origin),
+            self.scale,
+        ))
     }
 
     /// The scale factor.
@@ -149,7 +174,11 @@ impl Similarity {
     /// The same map with local lengths measured in `unit`s, a power of two.
     #[must_use]
     pub fn with_local_unit(&self, unit: f64) -> Self {
-        Self::new(self.columns, self.origin, self.scale.scale_by_power_of_two(unit))
+        Self::new(
+            self.columns,
+            self.origin,
+            self.scale.scale_by_power_of_two(unit),
+        )
     }
 
     /// Local axis `i` in world coordinates, a unit vector.
@@ -187,19 +216,30 @@ impl Similarity {
             let difference = Dd::sum(world[j], -hi);
             d[j] = difference.hi() - lo;
             // The rounding of the subtraction and of the second term; zero where both are exact.
-            inexact[j] = difference.lo().abs() + if lo == 0.0 { 0.0 } else { lo.abs() + 2.0 * U * d[j].abs() };
+            inexact[j] = difference.lo().abs()
+                + if lo == 0.0 {
+                    0.0
+                } else {
+                    lo.abs() + 2.0 * U * d[j].abs()
+                };
         }
         let mut point = DVec3::ZERO;
         let mut error = DVec3::ZERO;
         for i in 0..3 {
             let m = self.rows[i];
             point[i] = m[0] * d[0] + m[1] * d[1] + m[2] * d[2];
-            let carried = m[0].abs() * inexact[0] + m[1].abs() * inexact[1] + m[2].abs() * inexact[2];
+            let carried =
+                m[0].abs() * inexact[0] + m[1].abs() * inexact[1] + m[2].abs() * inexact[2];
             error[i] = if self.exact[i] {
                 carried
             } else {
                 // One rounding of the entry, one of the product and two of the sums each, doubled.
-                2.0 * carried + 8.0 * U * (m[0].abs() * d[0].abs() + m[1].abs() * d[1].abs() + m[2].abs() * d[2].abs())
+                2.0 * carried
+                    + 8.0
+                        * U
+                        * (m[0].abs() * d[0].abs()
+                            + m[1].abs() * d[1].abs()
+                            + m[2].abs() * d[2].abs())
             };
         }
         LocalPoint { point, error }
@@ -228,7 +268,8 @@ impl Similarity {
     #[must_use]
     pub fn to_world(&self, local: DVec3) -> DVec3 {
         let s = self.scale();
-        self.origin() + (self.axis(0) * local.x + self.axis(1) * local.y + self.axis(2) * local.z) * s
+        self.origin()
+            + (self.axis(0) * local.x + self.axis(1) * local.y + self.axis(2) * local.z) * s
     }
 }
 
@@ -238,28 +279,52 @@ mod tests {
 
     #[test]
     fn the_error_bound_covers_the_rounding() {
-        let frame = Similarity::from_axis(DVec3::new(1e6, -3.0, 0.1), DVec3::new(1.0, 2.0, -0.5), DVec3::X)
-            .and_then(|f| f.rotated(DVec3::new(0.3, 1.0, 0.2), 17.0))
-            .map(|f| f.scaled(0.3).translated(DVec3::new(0.1, 1e3, -7.7)))
-            .expect("a valid frame");
+        let frame = Similarity::from_axis(
+            DVec3::new(1e6, -3.0, 0.1),
+            DVec3::new(1.0, 2.0, -0.5),
+            DVec3::X,
+        )
+        .and_then(|f| f.rotated(DVec3::new(0.3, 1.0, 0.2), 17.0))
+        .map(|f| f.scaled(0.3).translated(DVec3::new(0.1, 1e3, -7.7)))
+        .expect("a valid frame");
         for i in 0..200 {
             let t = f64::from(i) * 0.37;
-            let p = frame.origin() + DVec3::new(t.sin(), (3.0 * t).cos(), t) * 10f64.powi(i % 9 - 4);
+            let p =
+                frame.origin() + DVec3::new(t.sin(), (3.0 * t).cos(), t) * 10f64.powi(i % 9 - 4);
             let (fast, exact) = (frame.to_local(p), frame.to_local_exact(p));
             for (a, exact) in exact.into_iter().enumerate() {
                 let off = (exact - Dd::of(fast.point[a])).abs().f64();
-                assert!(off <= fast.error[a], "{p}: off {off}, bound {}", fast.error[a]);
-                assert!(fast.error[a] <= 40.0 * U * (p.length() + 1e6), "{p}: loose {}", fast.error[a]);
+                assert!(
+                    off <= fast.error[a],
+                    "{p}: off {off}, bound {}",
+                    fast.error[a]
+                );
+                assert!(
+                    fast.error[a] <= 40.0 * U * (p.length() + 1e6),
+                    "{p}: loose {}",
+                    fast.error[a]
+                );
             }
         }
     }
 
     #[test]
     fn aligned_frames_are_exact() {
-        let frame = Similarity::from_axis(DVec3::ZERO, DVec3::Z * 3.0, DVec3::X * 0.1).expect("valid");
+        let frame =
+            Similarity::from_axis(DVec3::ZERO, DVec3::Z * 3.0, DVec3::X * 0.1).expect("valid");
         let p = DVec3::new(0.1, -0.7, 1e-3);
-        assert_eq!(frame.to_local(p), LocalPoint { point: p, error: DVec3::ZERO });
-        let turned = frame.rotated(DVec3::Z, 90.0).expect("valid").rotated(DVec3::X * 5.0, -90.0).expect("valid");
+        assert_eq!(
+            frame.to_local(p),
+            LocalPoint {
+                point: p,
+                error: DVec3::ZERO
+            }
+        );
+        let turned = frame
+            .rotated(DVec3::Z, 90.0)
+            .expect("valid")
+            .rotated(DVec3::X * 5.0, -90.0)
+            .expect("valid");
         assert_eq!(turned.to_local(p).error, DVec3::ZERO);
         assert_eq!(turned.axis(2), DVec3::Y);
     }
@@ -267,6 +332,13 @@ mod tests {
     #[test]
     fn a_parallel_x_or_a_zero_axis_is_no_frame() {
         assert!(Similarity::from_axis(DVec3::ZERO, DVec3::ZERO, DVec3::X).is_none());
-        assert!(Similarity::from_axis(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0), DVec3::new(-3.0, -3.0, 0.0)).is_none());
+        assert!(
+            Similarity::from_axis(
+                DVec3::ZERO,
+                DVec3::new(1.0, 1.0, 0.0),
+                DVec3::new(-3.0, -3.0, 0.0)
+            )
+            .is_none()
+        );
     }
 }

@@ -22,7 +22,11 @@ impl BoundaryPiece {
     /// +1 where the region lies at smaller r, -1 where it lies at larger r, 0 for a horizontal
     /// piece: the sign of the piece's disc in the area of a cross-section.
     pub(crate) fn disc_sign(&self) -> i32 {
-        if self.forward { self.piece.direction() } else { -self.piece.direction() }
+        if self.forward {
+            self.piece.direction()
+        } else {
+            -self.piece.direction()
+        }
     }
 }
 
@@ -38,7 +42,12 @@ const COINCIDENT: f64 = 5e-14;
 
 /// The boundary of the set of points whose windings, one for each operand, `inside` accepts.
 /// `operand` tells which operand a piece belongs to.
-pub(crate) fn filled_boundary(pieces: &[Piece], inside: &dyn Fn(&[Winding]) -> bool, operand: &dyn Fn(usize) -> usize, operands: usize) -> FilledBoundary {
+pub(crate) fn filled_boundary(
+    pieces: &[Piece],
+    inside: &dyn Fn(&[Winding]) -> bool,
+    operand: &dyn Fn(usize) -> usize,
+    operands: usize,
+) -> FilledBoundary {
     let meetings = meetings(pieces);
     let mut parts = Vec::new();
     let mut owner = Vec::new();
@@ -51,16 +60,32 @@ pub(crate) fn filled_boundary(pieces: &[Piece], inside: &dyn Fn(&[Winding]) -> b
     let mut kept = Vec::new();
     for (i, part) in parts.iter().enumerate() {
         if let Some(forward) = side(&set, &parts, &owner, operands, i, inside) {
-            kept.push(BoundaryPiece { piece: part.clone(), forward });
+            kept.push(BoundaryPiece {
+                piece: part.clone(),
+                forward,
+            });
         }
     }
-    FilledBoundary { pieces: kept, crossing: meetings.crossing }
+    FilledBoundary {
+        pieces: kept,
+        crossing: meetings.crossing,
+    }
 }
 
 /// `Some(forward)` where part `i` separates inside from outside.
-fn side(set: &CrossingSet, parts: &[Piece], owner: &[usize], operands: usize, i: usize, inside: &dyn Fn(&[Winding]) -> bool) -> Option<bool> {
+fn side(
+    set: &CrossingSet,
+    parts: &[Piece],
+    owner: &[usize],
+    operands: usize,
+    i: usize,
+    inside: &dyn Fn(&[Winding]) -> bool,
+) -> Option<bool> {
     let part = &parts[i];
-    let extent = [(part.end[0] - part.start[0]).f64(), (part.end[1] - part.start[1]).f64()];
+    let extent = [
+        (part.end[0] - part.start[0]).f64(),
+        (part.end[1] - part.start[1]).f64(),
+    ];
     // The ray runs across the part's longer extent.
     let c = usize::from(extent[1].abs() >= extent[0].abs());
     let middle = if part.degree() == 1 {
@@ -72,15 +97,22 @@ fn side(set: &CrossingSet, parts: &[Piece], owner: &[usize], operands: usize, i:
     let mut before = beyond.clone();
     let mut first = true;
     let mut seen_self = false;
-    set.count_beyond(parts, c, middle[c], middle[1 - c], COINCIDENT, |k, coincident, direction| {
-        before[owner[k]].cross(direction);
-        if coincident {
-            first &= k >= i;
-            seen_self |= k == i;
-        } else {
-            beyond[owner[k]].cross(direction);
-        }
-    });
+    set.count_beyond(
+        parts,
+        c,
+        middle[c],
+        middle[1 - c],
+        COINCIDENT,
+        |k, coincident, direction| {
+            before[owner[k]].cross(direction);
+            if coincident {
+                first &= k >= i;
+                seen_self |= k == i;
+            } else {
+                beyond[owner[k]].cross(direction);
+            }
+        },
+    );
     if !seen_self {
         // A part so short that its own middle is at its end; it bounds nothing measurable.
         return None;
@@ -90,7 +122,11 @@ fn side(set: &CrossingSet, parts: &[Piece], owner: &[usize], operands: usize, i:
         return None;
     }
     // Travelling up, the left is at smaller r; travelling out, it is at larger z.
-    Some(if c == 1 { (extent[1] > 0.0) == inside_before } else { (extent[0] > 0.0) == inside_beyond })
+    Some(if c == 1 {
+        (extent[1] > 0.0) == inside_before
+    } else {
+        (extent[0] > 0.0) == inside_beyond
+    })
 }
 
 /// The parts of a piece between the given parameters.
@@ -137,13 +173,17 @@ struct Meetings {
 fn meetings(pieces: &[Piece]) -> Meetings {
     let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds.grown(COINCIDENT)).collect();
     let tree = BoxTree::new(&boxes);
-    let mut found = Meetings { parameters: vec![Vec::new(); pieces.len()], crossing: None };
+    let mut found = Meetings {
+        parameters: vec![Vec::new(); pieces.len()],
+        crossing: None,
+    };
     for (i, piece) in pieces.iter().enumerate() {
         tree.visit(
             |b| b.overlaps(&boxes[i]),
             |j| {
                 let j = j as usize;
-                if j > i && boxes[j].overlaps(&boxes[i]) && !meet_only_in_corners(piece, &pieces[j]) {
+                if j > i && boxes[j].overlaps(&boxes[i]) && !meet_only_in_corners(piece, &pieces[j])
+                {
                     meet(piece, &pieces[j], i, j, &mut found);
                 }
             },
@@ -160,8 +200,14 @@ fn meet_only_in_corners(a: &Piece, b: &Piece) -> bool {
                 let (p, ab, bb) = (p.map(Real::f64), &a.bounds, &b.bounds);
                 // Opposite corners: the boxes lie on the two sides of the point in one coordinate
                 // and the coordinate is not constant for both.
-                let apart = |c: usize| (ab.max[c] <= p[c] && bb.min[c] >= p[c]) || (bb.max[c] <= p[c] && ab.min[c] >= p[c]);
-                let wide = |c: usize| ab.max[c] - ab.min[c] > 4.0 * COINCIDENT || bb.max[c] - bb.min[c] > 4.0 * COINCIDENT;
+                let apart = |c: usize| {
+                    (ab.max[c] <= p[c] && bb.min[c] >= p[c])
+                        || (bb.max[c] <= p[c] && ab.min[c] >= p[c])
+                };
+                let wide = |c: usize| {
+                    ab.max[c] - ab.min[c] > 4.0 * COINCIDENT
+                        || bb.max[c] - bb.min[c] > 4.0 * COINCIDENT
+                };
                 return apart(0) && wide(0) && apart(1) || apart(1) && wide(1) && apart(0);
             }
         }
@@ -178,19 +224,33 @@ struct Part {
 
 impl Part {
     fn whole(piece: &Piece) -> Self {
-        Self { t: [0.0, 1.0], p: [piece.start.map(Real::f64), piece.end.map(Real::f64)] }
+        Self {
+            t: [0.0, 1.0],
+            p: [piece.start.map(Real::f64), piece.end.map(Real::f64)],
+        }
     }
     fn bounds(&self) -> Box2 {
         Box2::around(self.p[0], self.p[1])
     }
     fn extent(&self) -> f64 {
-        (self.p[1][0] - self.p[0][0]).abs().max((self.p[1][1] - self.p[0][1]).abs())
+        (self.p[1][0] - self.p[0][0])
+            .abs()
+            .max((self.p[1][1] - self.p[0][1]).abs())
     }
     fn halves(&self, piece: &Piece) -> [Self; 2] {
         let m = 0.5 * (self.t[0] + self.t[1]);
         let p = piece.twin.at(m);
         let p = [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]];
-        [Self { t: [self.t[0], m], p: [self.p[0], p] }, Self { t: [m, self.t[1]], p: [p, self.p[1]] }]
+        [
+            Self {
+                t: [self.t[0], m],
+                p: [self.p[0], p],
+            },
+            Self {
+                t: [m, self.t[1]],
+                p: [p, self.p[1]],
+            },
+        ]
     }
 }
 
@@ -224,21 +284,34 @@ fn meet(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
 
 /// The parameter of `p` on `piece`, where it lies on it: 0 or 1 at its ends.
 fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<f64> {
-    let close = |q: [Dd; 2]| (q[0] - p[0]).f64().abs() <= COINCIDENT && (q[1] - p[1]).f64().abs() <= COINCIDENT;
+    let close = |q: [Dd; 2]| {
+        (q[0] - p[0]).f64().abs() <= COINCIDENT && (q[1] - p[1]).f64().abs() <= COINCIDENT
+    };
     if close(piece.start) {
         return Some(0.0);
     }
     if close(piece.end) {
         return Some(1.0);
     }
-    let extent = [(piece.end[0] - piece.start[0]).f64().abs(), (piece.end[1] - piece.start[1]).f64().abs()];
+    let extent = [
+        (piece.end[0] - piece.start[0]).f64().abs(),
+        (piece.end[1] - piece.start[1]).f64().abs(),
+    ];
     let c = usize::from(extent[1] >= extent[0]);
-    let (low, high) = if piece.start[c] <= piece.end[c] { (piece.start[c], piece.end[c]) } else { (piece.end[c], piece.start[c]) };
+    let (low, high) = if piece.start[c] <= piece.end[c] {
+        (piece.start[c], piece.end[c])
+    } else {
+        (piece.end[c], piece.start[c])
+    };
     if !(p[c] > low && p[c] < high) {
         return None;
     }
     // Along the longer extent the slope is at most about 1, so the offset is a distance.
-    let t = if piece.degree() == 1 { (p[c] - piece.start[c]) / (piece.end[c] - piece.start[c]) } else { piece.parameter_at(c, p[c]) };
+    let t = if piece.degree() == 1 {
+        (p[c] - piece.start[c]) / (piece.end[c] - piece.start[c])
+    } else {
+        piece.parameter_at(c, p[c])
+    };
     ((piece.other_at(c, p[c]) - p[1 - c]).f64().abs() <= COINCIDENT).then(|| t.f64())
 }
 
@@ -279,7 +352,10 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
             continue;
         }
         let p = x.p[0];
-        if seen.iter().any(|q| (p[0] - q[0]).abs().max((p[1] - q[1]).abs()) <= 1e-10) {
+        if seen
+            .iter()
+            .any(|q| (p[0] - q[0]).abs().max((p[1] - q[1]).abs()) <= 1e-10)
+        {
             continue;
         }
         if x.extent().max(y.extent()) <= 1e-14 {

@@ -57,7 +57,9 @@ pub(crate) struct CrossingSet {
 impl CrossingSet {
     pub(crate) fn new(pieces: &[Piece]) -> Self {
         let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds).collect();
-        Self { tree: BoxTree::new(&boxes) }
+        Self {
+            tree: BoxTree::new(&boxes),
+        }
     }
 
     pub(crate) fn tree(&self) -> &BoxTree {
@@ -69,7 +71,10 @@ impl CrossingSet {
         let mut winding = Winding::default();
         let mut decided = true;
         // Boxes are rounded to nearest; one ulp of the unit square covers that.
-        let (er, ez) = (p.r_error + 2.0 * f64::EPSILON, p.z_error + 2.0 * f64::EPSILON);
+        let (er, ez) = (
+            p.r_error + 2.0 * f64::EPSILON,
+            p.z_error + 2.0 * f64::EPSILON,
+        );
         let near = |b: &Box2| p.z >= b.min[1] - ez && p.z <= b.max[1] + ez && p.r <= b.max[0] + er;
         self.tree.visit(near, |i| {
             let piece = &pieces[i as usize];
@@ -79,11 +84,19 @@ impl CrossingSet {
             let within = p.r >= piece.bounds.min[0] - er;
             if piece.is_horizontal() {
                 // Never crossed; but the point may lie on it.
-                decided = !(within && compare(p.z, p.z_error, piece.start[1]).is_none_or(Ordering::is_eq));
+                decided = !(within
+                    && compare(p.z, p.z_error, piece.start[1]).is_none_or(Ordering::is_eq));
                 return;
             }
-            let (low, high) = if piece.direction() > 0 { (piece.start, piece.end) } else { (piece.end, piece.start) };
-            let (Some(above_low), Some(above_high)) = (compare(p.z, p.z_error, low[1]), compare(p.z, p.z_error, high[1])) else {
+            let (low, high) = if piece.direction() > 0 {
+                (piece.start, piece.end)
+            } else {
+                (piece.end, piece.start)
+            };
+            let (Some(above_low), Some(above_high)) = (
+                compare(p.z, p.z_error, low[1]),
+                compare(p.z, p.z_error, high[1]),
+            ) else {
                 decided = false;
                 return;
             };
@@ -123,23 +136,33 @@ impl CrossingSet {
         let mut on = false;
         let margin = 4.0 * f64::EPSILON;
         let (rf, zf) = (r.f64(), z.f64());
-        let near = |b: &Box2| zf >= b.min[1] - margin && zf <= b.max[1] + margin && rf <= b.max[0] + margin;
+        let near = |b: &Box2| {
+            zf >= b.min[1] - margin && zf <= b.max[1] + margin && rf <= b.max[0] + margin
+        };
         let close = |a: Dd, b: Dd| (a - b).abs().f64() <= ON_BOUNDARY;
         self.tree.visit(near, |i| {
             let piece = &pieces[i as usize];
             if on || piece.on_axis {
                 return;
             }
-            if [piece.start, piece.end].iter().any(|v| close(v[0], r) && close(v[1], z)) {
+            if [piece.start, piece.end]
+                .iter()
+                .any(|v| close(v[0], r) && close(v[1], z))
+            {
                 on = true;
                 return;
             }
             if piece.is_horizontal() {
                 let (a, b) = (piece.start[0], piece.end[0]);
-                on |= close(piece.start[1], z) && (r - a).f64().signum() * (r - b).f64().signum() <= 0.0;
+                on |= close(piece.start[1], z)
+                    && (r - a).f64().signum() * (r - b).f64().signum() <= 0.0;
                 return;
             }
-            let (low, high) = if piece.direction() > 0 { (piece.start, piece.end) } else { (piece.end, piece.start) };
+            let (low, high) = if piece.direction() > 0 {
+                (piece.start, piece.end)
+            } else {
+                (piece.end, piece.start)
+            };
             if z < low[1] || z > high[1] {
                 return;
             }
@@ -149,12 +172,24 @@ impl CrossingSet {
                 _ => {}
             }
         });
-        if on { Count::OnBoundary } else { Count::Crossings(winding) }
+        if on {
+            Count::OnBoundary
+        } else {
+            Count::Crossings(winding)
+        }
     }
 
     /// Crossings at a larger coordinate `1 - c` along the line on which coordinate `c` is `v`,
     /// leaving out piece `skip` and those within `coincident` of `from`, which are returned apart.
-    pub(crate) fn count_beyond(&self, pieces: &[Piece], c: usize, v: Dd, from: Dd, coincident: f64, mut each: impl FnMut(usize, bool, i32)) {
+    pub(crate) fn count_beyond(
+        &self,
+        pieces: &[Piece],
+        c: usize,
+        v: Dd,
+        from: Dd,
+        coincident: f64,
+        mut each: impl FnMut(usize, bool, i32),
+    ) {
         let vf = v.f64();
         let margin = 4.0 * f64::EPSILON;
         let limit = from.f64() - coincident - margin;
@@ -162,7 +197,11 @@ impl CrossingSet {
             |b| vf >= b.min[c] - margin && vf <= b.max[c] + margin && b.max[1 - c] >= limit,
             |i| {
                 let piece = &pieces[i as usize];
-                let (low, high) = if piece.start[c] <= piece.end[c] { (piece.start[c], piece.end[c]) } else { (piece.end[c], piece.start[c]) };
+                let (low, high) = if piece.start[c] <= piece.end[c] {
+                    (piece.start[c], piece.end[c])
+                } else {
+                    (piece.end[c], piece.start[c])
+                };
                 if !(v >= low && v < high) {
                     return;
                 }
@@ -193,9 +232,17 @@ impl ClosedSection {
 
     /// Whether the closed region holds the point, given exactly by its f64s.
     pub(crate) fn contains(&self, r: f64, z: f64) -> bool {
-        let p = MeridianPoint { r, z, r_error: 0.0, z_error: 0.0 };
+        let p = MeridianPoint {
+            r,
+            z,
+            r_error: 0.0,
+            z_error: 0.0,
+        };
         let count = self.crossings.count(&self.pieces, p);
-        match count.unwrap_or_else(|| self.crossings.count_exact(&self.pieces, Dd::of(r), Dd::of(z))) {
+        match count.unwrap_or_else(|| {
+            self.crossings
+                .count_exact(&self.pieces, Dd::of(r), Dd::of(z))
+        }) {
             Count::OnBoundary => true,
             Count::Crossings(w) => w.crossings % 2 == 1,
         }

@@ -68,7 +68,11 @@ pub(crate) struct Bezier {
 impl Bezier {
     fn segment(a: [Dd; 2], b: [Dd; 2], interval: [f64; 2]) -> Self {
         let lift = |p: [Dd; 2]| [p[0], p[1], Dd::ONE];
-        Self { points: vec![lift(a), lift(b)], interval, circle: None }
+        Self {
+            points: vec![lift(a), lift(b)],
+            interval,
+            circle: None,
+        }
     }
 }
 
@@ -79,7 +83,12 @@ fn exact(p: [f64; 2]) -> [Dd; 2] {
 /// The Bézier pieces of a curve, head to tail; neighbours share their end points to the last bit.
 pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
     let mut pieces = match curve {
-        ProfileCurve::Nurbs { degree, knots, points, weights } => {
+        ProfileCurve::Nurbs {
+            degree,
+            knots,
+            points,
+            weights,
+        } => {
             let knots: Vec<Dd> = knots.iter().copied().map(Dd::of).collect();
             let points: Vec<HomogeneousPoint> = points
                 .iter()
@@ -97,7 +106,10 @@ pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
         }
         ProfileCurve::Polyline { points } => {
             if points.len() < 2 {
-                return Err(format!("has {} points; a polyline needs at least 2", points.len()));
+                return Err(format!(
+                    "has {} points; a polyline needs at least 2",
+                    points.len()
+                ));
             }
             #[allow(clippy::cast_precision_loss, reason = "a count")]
             points
@@ -106,7 +118,13 @@ pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
                 .map(|(i, w)| Bezier::segment(exact(w[0]), exact(w[1]), [i as f64, i as f64 + 1.0]))
                 .collect()
         }
-        ProfileCurve::Arc { center, radii, tilt, from, to } => arc(*center, *radii, *tilt, *from, *to)?,
+        ProfileCurve::Arc {
+            center,
+            radii,
+            tilt,
+            from,
+            to,
+        } => arc(*center, *radii, *tilt, *from, *to)?,
         ProfileCurve::Interpolate { points, degree } => interpolate(points, *degree)?,
         ProfileCurve::Reversed(inner) => {
             let mut pieces = beziers(inner)?;
@@ -123,7 +141,11 @@ pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
         let next = &mut pieces[i].points[0];
         // The two spans agree on their joint in exact arithmetic, up to a common factor.
         let ratio = next[2] / joint[2];
-        *next = if ratio == Dd::ONE { joint } else { joint.map(|c| c * ratio) };
+        *next = if ratio == Dd::ONE {
+            joint
+        } else {
+            joint.map(|c| c * ratio)
+        };
     }
     Ok(pieces)
 }
@@ -137,14 +159,28 @@ fn extract(degree: usize, knots: &[Dd], points: &[HomogeneousPoint]) -> Vec<Bezi
             continue;
         }
         let local = &points[span - degree..=span];
-        let piece = (0..=degree).map(|j| blossom(degree, knots, span, local, a, b, j)).collect();
-        pieces.push(Bezier { points: piece, interval: [a.f64(), b.f64()], circle: None });
+        let piece = (0..=degree)
+            .map(|j| blossom(degree, knots, span, local, a, b, j))
+            .collect();
+        pieces.push(Bezier {
+            points: piece,
+            interval: [a.f64(), b.f64()],
+            circle: None,
+        });
     }
     pieces
 }
 
 /// The blossom with `from_b` arguments equal to `b` and the rest equal to `a`.
-fn blossom(degree: usize, knots: &[Dd], span: usize, local: &[HomogeneousPoint], a: Dd, b: Dd, from_b: usize) -> HomogeneousPoint {
+fn blossom(
+    degree: usize,
+    knots: &[Dd],
+    span: usize,
+    local: &[HomogeneousPoint],
+    a: Dd,
+    b: Dd,
+    from_b: usize,
+) -> HomogeneousPoint {
     let mut work: Vec<HomogeneousPoint> = local.to_vec();
     for r in 1..=degree {
         let x = if r <= from_b { b } else { a };
@@ -161,11 +197,19 @@ fn blossom(degree: usize, knots: &[Dd], span: usize, local: &[HomogeneousPoint],
 }
 
 /// Quadratic pieces of at most 90 degrees: on-points of weight 1, middle points of weight cos(δ/2).
-fn arc(center: [f64; 2], radii: [f64; 2], tilt: f64, from: f64, to: f64) -> Result<Vec<Bezier>, String> {
+fn arc(
+    center: [f64; 2],
+    radii: [f64; 2],
+    tilt: f64,
+    from: f64,
+    to: f64,
+) -> Result<Vec<Bezier>, String> {
     let sweep = Dd::sum(to, -from);
     let turn = sweep.f64().abs();
     if !(turn > 0.0 && turn <= 360.0) {
-        return Err(format!("turns from {from} to {to} degrees; an arc must turn by more than 0 and at most 360"));
+        return Err(format!(
+            "turns from {from} to {to} degrees; an arc must turn by more than 0 and at most 360"
+        ));
     }
     let count = (turn / 90.0).ceil();
     let step = sweep / Dd::of(count);
@@ -188,9 +232,17 @@ fn arc(center: [f64; 2], radii: [f64; 2], tilt: f64, from: f64, to: f64) -> Resu
     while i < count {
         let angle = |k: f64| Dd::of(from) + step * Dd::of(k);
         // The last angle is the given one, so that a full turn closes exactly.
-        let end = if i + 1.0 == count { Dd::of(to) } else { angle(i + 1.0) };
+        let end = if i + 1.0 == count {
+            Dd::of(to)
+        } else {
+            angle(i + 1.0)
+        };
         pieces.push(Bezier {
-            points: vec![at(angle(i), Dd::ONE), at(angle(i + 0.5), weight), at(end, Dd::ONE)],
+            points: vec![
+                at(angle(i), Dd::ONE),
+                at(angle(i + 0.5), weight),
+                at(end, Dd::ONE),
+            ],
             interval: [angle(i).f64(), end.f64()],
             circle,
         });
@@ -219,7 +271,9 @@ fn basis(degree: usize, knots: &[Dd], span: usize, u: Dd) -> Vec<Dd> {
 fn interpolate(points: &[[f64; 2]], degree: usize) -> Result<Vec<Bezier>, String> {
     let n = points.len();
     if n < 2 {
-        return Err(format!("has {n} points; an interpolating curve needs at least 2"));
+        return Err(format!(
+            "has {n} points; an interpolating curve needs at least 2"
+        ));
     }
     if degree == 0 {
         return Err("has degree 0; the degree must be at least 1".into());
@@ -241,7 +295,10 @@ fn interpolate(points: &[[f64; 2]], degree: usize) -> Result<Vec<Bezier>, String
         }
         let power = (-largest.log2().floor()).exp2();
         let d = d.map(|c| c.scale_by_power_of_two(power));
-        length = length + (d[0] * d[0] + d[1] * d[1]).sqrt().scale_by_power_of_two(1.0 / power);
+        length = length
+            + (d[0] * d[0] + d[1] * d[1])
+                .sqrt()
+                .scale_by_power_of_two(1.0 / power);
         parameters.push(length);
     }
     for u in &mut parameters {
@@ -251,7 +308,9 @@ fn interpolate(points: &[[f64; 2]], degree: usize) -> Result<Vec<Bezier>, String
     let mut knots = vec![Dd::ZERO; degree + 1];
     #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
     for j in 1..n - degree {
-        let total = parameters[j..j + degree].iter().fold(Dd::ZERO, |s, &u| s + u);
+        let total = parameters[j..j + degree]
+            .iter()
+            .fold(Dd::ZERO, |s, &u| s + u);
         knots.push(total / Dd::of(degree as f64));
     }
     knots.extend(std::iter::repeat_n(Dd::ONE, degree + 1));
@@ -327,14 +386,26 @@ mod tests {
     use crate::math::bernstein::evaluate;
 
     fn at(b: &Bezier, t: f64) -> [Dd; 2] {
-        let c = [0, 1, 2].map(|k| evaluate(&b.points.iter().map(|p| p[k]).collect::<Vec<_>>(), Dd::of(t)));
+        let c = [0, 1, 2].map(|k| {
+            evaluate(
+                &b.points.iter().map(|p| p[k]).collect::<Vec<_>>(),
+                Dd::of(t),
+            )
+        });
         [c[0] / c[2], c[1] / c[2]]
     }
 
     #[test]
     fn arcs_lie_on_their_circle_to_thirty_digits() {
         for (from, to) in [(0.0, 360.0), (350.0, 370.0), (90.0, -200.0), (17.0, 18.0)] {
-            let pieces = beziers(&ProfileCurve::Arc { center: [3.0, -1.0], radii: [0.7, 0.7], tilt: 0.0, from, to }).expect("an arc");
+            let pieces = beziers(&ProfileCurve::Arc {
+                center: [3.0, -1.0],
+                radii: [0.7, 0.7],
+                tilt: 0.0,
+                from,
+                to,
+            })
+            .expect("an arc");
             for piece in &pieces {
                 for i in 0..=8 {
                     let p = at(piece, f64::from(i) / 8.0);
@@ -348,16 +419,30 @@ mod tests {
 
     #[test]
     fn a_full_turn_closes_exactly() {
-        let pieces = beziers(&ProfileCurve::Arc { center: [1.0, 0.0], radii: [0.35, 0.35], tilt: 0.0, from: 0.0, to: 360.0 }).expect("a circle");
+        let pieces = beziers(&ProfileCurve::Arc {
+            center: [1.0, 0.0],
+            radii: [0.35, 0.35],
+            tilt: 0.0,
+            from: 0.0,
+            to: 360.0,
+        })
+        .expect("a circle");
         assert_eq!(pieces.len(), 4);
         assert_eq!(pieces[0].points[0], pieces[3].points[2]);
     }
 
     #[test]
     fn interpolating_curves_pass_through_their_points() {
-        let points: Vec<[f64; 2]> = (0..23).map(|i| f64::from(i)).map(|t| [2.0 + (0.7 * t).sin(), t * 0.3 + (t * 1.9).cos() * 0.2]).collect();
+        let points: Vec<[f64; 2]> = (0..23)
+            .map(|i| f64::from(i))
+            .map(|t| [2.0 + (0.7 * t).sin(), t * 0.3 + (t * 1.9).cos() * 0.2])
+            .collect();
         for degree in 1..=7 {
-            let pieces = beziers(&ProfileCurve::Interpolate { points: points.clone(), degree }).expect("a curve");
+            let pieces = beziers(&ProfileCurve::Interpolate {
+                points: points.clone(),
+                degree,
+            })
+            .expect("a curve");
             let ends: Vec<[Dd; 2]> = pieces.iter().map(|b| at(b, 0.0)).collect();
             assert_eq!(ends[0], exact(points[0]));
             for p in &points {

@@ -33,8 +33,14 @@ struct Arc {
 
 #[derive(Debug, Clone)]
 enum Shape {
-    Segment { direction: [f64; 2], length_squared: f64 },
-    Circle { centre: [f64; 2], radius: f64 },
+    Segment {
+        direction: [f64; 2],
+        length_squared: f64,
+    },
+    Circle {
+        centre: [f64; 2],
+        radius: f64,
+    },
     Rational(Box<Rational>),
 }
 
@@ -76,7 +82,11 @@ impl DistanceSet {
                 if start == end {
                     continue;
                 }
-                let part = if parts == 1 { piece.clone() } else { piece.part(cut(i), cut(i + 1), start, end) };
+                let part = if parts == 1 {
+                    piece.clone()
+                } else {
+                    piece.part(cut(i), cut(i + 1), start, end)
+                };
                 arcs.push(Arc::new(&part));
                 // One ulp of the unit square covers the rounding of the corners.
                 boxes.push(part.bounds.grown(f64::EPSILON));
@@ -115,21 +125,35 @@ impl Arc {
         let ends = [relative(piece.start), relative(piece.end)];
         let shape = if piece.degree() == 1 {
             let direction = [0, 1].map(|c| (piece.end[c] - piece.start[c]).f64());
-            Shape::Segment { direction, length_squared: direction[0] * direction[0] + direction[1] * direction[1] }
+            Shape::Segment {
+                direction,
+                length_squared: direction[0] * direction[0] + direction[1] * direction[1],
+            }
         } else if let Some((centre, radius)) = piece.circle {
-            Shape::Circle { centre: relative(centre), radius: radius.f64() }
+            Shape::Circle {
+                centre: relative(centre),
+                radius: radius.f64(),
+            }
         } else {
             Shape::Rational(Box::new(Rational::new(piece, middle)))
         };
-        Self { origin: middle, ends, shape }
+        Self {
+            origin: middle,
+            ends,
+            shape,
+        }
     }
 
     fn distance_squared(&self, point: [f64; 2], limit: f64) -> f64 {
         let q = [point[0] - self.origin[0], point[1] - self.origin[1]];
         let [a, b] = self.ends.map(|e| square(q, e));
         match &self.shape {
-            Shape::Segment { direction: d, length_squared } => {
-                let s = ((q[0] - self.ends[0][0]) * d[0] + (q[1] - self.ends[0][1]) * d[1]) / length_squared;
+            Shape::Segment {
+                direction: d,
+                length_squared,
+            } => {
+                let s = ((q[0] - self.ends[0][0]) * d[0] + (q[1] - self.ends[0][1]) * d[1])
+                    / length_squared;
                 if s <= 0.0 {
                     return a;
                 }
@@ -173,20 +197,45 @@ type Interval = (Coefficients<f64>, f64, f64);
 impl Rational {
     fn new(piece: &Piece, middle: [f64; 2]) -> Self {
         let coordinate = |c: usize| -> Coefficients<Dd> {
-            piece.points.iter().map(|p| if c < 2 { p[c] - Dd::of(middle[c]) * p[2] } else { p[2] }).collect()
+            piece
+                .points
+                .iter()
+                .map(|p| {
+                    if c < 2 {
+                        p[c] - Dd::of(middle[c]) * p[2]
+                    } else {
+                        p[2]
+                    }
+                })
+                .collect()
         };
         // Weights near 1, by a power of two.
         let largest = piece.points.iter().fold(0.0_f64, |m, p| m.max(p[2].f64()));
         let power = (-largest.log2().floor()).exp2();
-        let [r, z, w] = [0, 1, 2].map(|c| -> Coefficients<Dd> { coordinate(c).iter().map(|v| v.scale_by_power_of_two(power)).collect() });
+        let [r, z, w] = [0, 1, 2].map(|c| -> Coefficients<Dd> {
+            coordinate(c)
+                .iter()
+                .map(|v| v.scale_by_power_of_two(power))
+                .collect()
+        });
         let polynomial = w.iter().all(|x| *x == w[0]);
-        let slope = |a: &[Dd]| if polynomial { bernstein::derivative(a) } else { bernstein::quotient_derivative(a, &w) };
+        let slope = |a: &[Dd]| {
+            if polynomial {
+                bernstein::derivative(a)
+            } else {
+                bernstein::quotient_derivative(a, &w)
+            }
+        };
         let (dr, dz) = (slope(&r), slope(&z));
         let a = bernstein::sum(&bernstein::product(&r, &dr), &bernstein::product(&z, &dz));
         // The weight of a polynomial piece is a constant; keeping it as such keeps H at degree 2p - 1.
         let [b, c] = [&dr, &dz].map(|d| bernstein::product(&w, d));
-        let to_f64 = |v: &Coefficients<Dd>| -> Coefficients<f64> { v.iter().map(|x| x.f64()).collect() };
-        Self { coefficients: [to_f64(&r), to_f64(&z), to_f64(&w)], stationary: [to_f64(&a), to_f64(&b), to_f64(&c)] }
+        let to_f64 =
+            |v: &Coefficients<Dd>| -> Coefficients<f64> { v.iter().map(|x| x.f64()).collect() };
+        Self {
+            coefficients: [to_f64(&r), to_f64(&z), to_f64(&w)],
+            stationary: [to_f64(&a), to_f64(&b), to_f64(&c)],
+        }
     }
 
     fn square_at(&self, q: [f64; 2], t: f64) -> f64 {
@@ -272,7 +321,11 @@ fn rises(h: &[f64]) -> bool {
 fn root(h: &[f64]) -> f64 {
     let (mut lo, mut hi) = (0.0_f64, 1.0_f64);
     let (first, last) = (h[0], h[h.len() - 1]);
-    let mut t = if first < 0.0 && last > 0.0 { first / (first - last) } else { 0.5 };
+    let mut t = if first < 0.0 && last > 0.0 {
+        first / (first - last)
+    } else {
+        0.5
+    };
     for _ in 0..80 {
         let (v, d) = bernstein::evaluate_with_derivative(h, t);
         if v < 0.0 {

@@ -30,7 +30,9 @@ pub enum RegionError {
         allowed: f64,
     },
     /// A curve crosses the axis.
-    #[error("curve {curve} reaches r = {r:e} at parameter {parameter}; r must not fall below {allowed:e}")]
+    #[error(
+        "curve {curve} reaches r = {r:e} at parameter {parameter}; r must not fall below {allowed:e}"
+    )]
     BelowAxis {
         /// Which loop.
         loop_index: usize,
@@ -65,8 +67,15 @@ impl RegionError {
     pub fn place(&self) -> Option<(usize, Option<usize>)> {
         match self {
             Self::Empty { loop_index } => Some((*loop_index, None)),
-            Self::Gap { loop_index, next, .. } => Some((*loop_index, Some(*next))),
-            Self::BelowAxis { loop_index, curve, .. } | Self::Curve { loop_index, curve, .. } => Some((*loop_index, Some(*curve))),
+            Self::Gap {
+                loop_index, next, ..
+            } => Some((*loop_index, Some(*next))),
+            Self::BelowAxis {
+                loop_index, curve, ..
+            }
+            | Self::Curve {
+                loop_index, curve, ..
+            } => Some((*loop_index, Some(*curve))),
             Self::NoArea => None,
         }
     }

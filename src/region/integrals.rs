@@ -35,8 +35,15 @@ pub(crate) fn r_squared_dz(boundary: &[BoundaryPiece]) -> Integral {
         let value = if part.forward { one.value } else { -one.value };
         // Neumaier's summation: the pieces of a thin ring nearly cancel.
         let sum = total.value + value;
-        carry += if total.value.abs() >= value.abs() { (total.value - sum) + value } else { (value - sum) + total.value };
-        total = Integral { value: sum, error: total.error + one.error };
+        carry += if total.value.abs() >= value.abs() {
+            (total.value - sum) + value
+        } else {
+            (value - sum) + total.value
+        };
+        total = Integral {
+            value: sum,
+            error: total.error + one.error,
+        };
     }
     total.value += carry;
     total

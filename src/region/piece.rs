@@ -61,11 +61,26 @@ pub(crate) struct Twin {
 }
 
 impl Piece {
-    pub(crate) fn new(points: Vec<HomogeneousPoint>, start: [Dd; 2], end: [Dd; 2], loop_index: usize, circle: Option<([Dd; 2], Dd)>) -> Self {
+    pub(crate) fn new(
+        points: Vec<HomogeneousPoint>,
+        start: [Dd; 2],
+        end: [Dd; 2],
+        loop_index: usize,
+        circle: Option<([Dd; 2], Dd)>,
+    ) -> Self {
         let on_axis = points.iter().all(|p| p[0] == Dd::ZERO);
         let twin = Twin::new(&points, start);
         let bounds = Box2::around(start.map(Real::f64), end.map(Real::f64));
-        Self { points, start, end, loop_index, on_axis, circle, bounds, twin }
+        Self {
+            points,
+            start,
+            end,
+            loop_index,
+            on_axis,
+            circle,
+            bounds,
+            twin,
+        }
     }
 
     /// A straight piece.
@@ -102,7 +117,9 @@ impl Piece {
     /// The part between two parameters, `a < b`.
     pub(crate) fn part(&self, a: Dd, b: Dd, start: [Dd; 2], end: [Dd; 2]) -> Self {
         let coordinates = [0, 1, 2].map(|c| bernstein::restrict(&self.coordinate(c), a, b));
-        let points = (0..self.points.len()).map(|i| [coordinates[0][i], coordinates[1][i], coordinates[2][i]]).collect();
+        let points = (0..self.points.len())
+            .map(|i| [coordinates[0][i], coordinates[1][i], coordinates[2][i]])
+            .collect();
         let mut part = Self::new(points, start, end, self.loop_index, self.circle);
         part.on_axis = self.on_axis;
         part
@@ -134,12 +151,20 @@ impl Piece {
             if (hi - lo).f64() <= PARAMETER_RESOLUTION {
                 break;
             }
-            let step = if slope == Dd::ZERO { Dd::ONE } else { value / slope };
+            let step = if slope == Dd::ZERO {
+                Dd::ONE
+            } else {
+                value / slope
+            };
             if step.abs().f64() <= PARAMETER_RESOLUTION {
                 break;
             }
             let newton = t - step;
-            t = if newton > lo && newton < hi { newton } else { (lo + hi) * Dd::of(0.5) };
+            t = if newton > lo && newton < hi {
+                newton
+            } else {
+                (lo + hi) * Dd::of(0.5)
+            };
         }
         t
     }
@@ -205,13 +230,20 @@ impl Piece {
                 None
             }
         };
-        let end = [(self.end[0] - Dd::of(t.origin[0])).f64(), (self.end[1] - Dd::of(t.origin[1])).f64()];
-        let start = [(self.start[0] - Dd::of(t.origin[0])).f64(), (self.start[1] - Dd::of(t.origin[1])).f64()];
+        let end = [
+            (self.end[0] - Dd::of(t.origin[0])).f64(),
+            (self.end[1] - Dd::of(t.origin[1])).f64(),
+        ];
+        let start = [
+            (self.start[0] - Dd::of(t.origin[0])).f64(),
+            (self.start[1] - Dd::of(t.origin[1])).f64(),
+        ];
         if self.degree() == 1 {
             let (dr, dz) = (end[0] - start[0], end[1] - start[1]);
             let (qr, qz) = (q[0] - start[0], q[1] - start[1]);
             let side = qr * dz - qz * dr;
-            let bound = error * (dr.abs() + dz.abs()) + gamma(8.0) * (qr.abs() * dz.abs() + qz.abs() * dr.abs());
+            let bound = error * (dr.abs() + dz.abs())
+                + gamma(8.0) * (qr.abs() * dz.abs() + qz.abs() * dr.abs());
             // Positive on the right of a rising segment, that is behind it.
             return match side.abs() > bound {
                 true if (side > 0.0) == (dz > 0.0) => Some(Position::Behind),
@@ -248,7 +280,11 @@ impl Piece {
             let secant = lo + (hi - lo) * ((q[1] - a[1]) / (b[1] - a[1]));
             let middle = 0.5 * (lo + hi);
             // Secant and bisection in turn: the one is quick, the other shrinks both ends.
-            let m = if step % 2 == 0 && secant > lo && secant < hi { 0.98 * secant + 0.02 * middle } else { middle };
+            let m = if step % 2 == 0 && secant > lo && secant < hi {
+                0.98 * secant + 0.02 * middle
+            } else {
+                middle
+            };
             if !(m > lo && m < hi) {
                 return None;
             }
@@ -267,9 +303,19 @@ impl Piece {
     /// The piece under `r -> k r`, `z -> h z + d`, as coaxial frames differ.
     pub(crate) fn mapped(&self, k: Dd, h: Dd, d: Dd) -> Self {
         let point = |p: [Dd; 2]| [p[0] * k, p[1] * h + d];
-        let points = self.points.iter().map(|p| [p[0] * k, p[1] * h + d * p[2], p[2]]).collect();
+        let points = self
+            .points
+            .iter()
+            .map(|p| [p[0] * k, p[1] * h + d * p[2], p[2]])
+            .collect();
         let circle = self.circle.map(|(c, r)| (point(c), r * k));
-        let mut mapped = Self::new(points, point(self.start), point(self.end), self.loop_index, circle);
+        let mut mapped = Self::new(
+            points,
+            point(self.start),
+            point(self.end),
+            self.loop_index,
+            circle,
+        );
         mapped.on_axis = self.on_axis;
         mapped
     }
@@ -293,14 +339,32 @@ impl Twin {
         let coefficients = [0, 1, 2].map(|c| -> Coefficients<f64> {
             points
                 .iter()
-                .map(|p| if c < 2 { p[c] - Dd::of(origin[c]) * p[2] } else { p[2] }.scale_by_power_of_two(power).f64())
+                .map(|p| {
+                    if c < 2 {
+                        p[c] - Dd::of(origin[c]) * p[2]
+                    } else {
+                        p[2]
+                    }
+                    .scale_by_power_of_two(power)
+                    .f64()
+                })
                 .collect()
         });
         let w = &coefficients[2];
-        let reach = |c: usize| coefficients[c].iter().zip(w).fold(0.0_f64, |m, (v, w)| m.max((v / w).abs()));
+        let reach = |c: usize| {
+            coefficients[c]
+                .iter()
+                .zip(w)
+                .fold(0.0_f64, |m, (v, w)| m.max((v / w).abs()))
+        };
         #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
         let error = gamma(6.0 * (points.len() as f64) + 8.0) * reach(0).max(reach(1));
-        Self { origin, coefficients, error, table: Vec::new() }
+        Self {
+            origin,
+            coefficients,
+            error,
+            table: Vec::new(),
+        }
     }
 
     /// The point at `t`, relative to the origin.
@@ -314,12 +378,17 @@ impl Twin {
 /// Cuts a Bézier piece of a curve, already in the region's unit, where r or z turns and where r
 /// changes sign. Returns parameters and points of the cuts, both ends included.
 pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
-    let coordinate = |c: usize| -> Coefficients<Dd> { bezier.points.iter().map(|p| p[c]).collect() };
+    let coordinate =
+        |c: usize| -> Coefficients<Dd> { bezier.points.iter().map(|p| p[c]).collect() };
     let [r, z, w] = [coordinate(0), coordinate(1), coordinate(2)];
     let polynomial = w.iter().all(|x| *x == w[0]);
     let mut parameters = Vec::new();
     for c in [&r, &z] {
-        let turning = if polynomial { bernstein::derivative(c) } else { bernstein::quotient_derivative(c, &w) };
+        let turning = if polynomial {
+            bernstein::derivative(c)
+        } else {
+            bernstein::quotient_derivative(c, &w)
+        };
         parameters.extend(bernstein::sign_change_parameters(&turning));
     }
     if r.iter().any(|x| *x < Dd::ZERO) {
@@ -343,7 +412,11 @@ pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
             } else if t == Dd::ONE {
                 bezier.points[last]
             } else {
-                [bernstein::evaluate(&r, t), bernstein::evaluate(&z, t), bernstein::evaluate(&w, t)]
+                [
+                    bernstein::evaluate(&r, t),
+                    bernstein::evaluate(&z, t),
+                    bernstein::evaluate(&w, t),
+                ]
             };
             (t, [a / c, b / c])
         })

@@ -15,7 +15,6 @@ use crate::math::{Dd, Real};
 use crate::nurbs::{self, BasisCache, KnotVector};
 use std::sync::OnceLock;
 
-
 /// Curves in order, head to tail.
 pub type ProfileLoop = Vec<ProfileCurve>;
 
@@ -91,15 +90,29 @@ impl Region {
         if loops.is_empty() {
             return Err(RegionError::Empty { loop_index: 0 });
         }
-        let mut chains = loops.iter().enumerate().map(|(i, l)| chain(i, l)).collect::<Result<Vec<_>, _>>()?;
+        let mut chains = loops
+            .iter()
+            .enumerate()
+            .map(|(i, l)| chain(i, l))
+            .collect::<Result<Vec<_>, _>>()?;
         // The unit comes from control points: it only has to bring the numbers near 1.
-        let reach = chains.iter().flat_map(|c| &c.pieces).flat_map(|(b, _)| &b.points);
-        let reach = reach.fold(0.0_f64, |m, p| m.max((p[0] / p[2]).f64().abs()).max((p[1] / p[2]).f64().abs()));
+        let reach = chains
+            .iter()
+            .flat_map(|c| &c.pieces)
+            .flat_map(|(b, _)| &b.points);
+        let reach = reach.fold(0.0_f64, |m, p| {
+            m.max((p[0] / p[2]).f64().abs())
+                .max((p[1] / p[2]).f64().abs())
+        });
         if !(reach > 0.0 && reach.is_finite()) {
             return Err(RegionError::NoArea);
         }
         let unit = (reach.log2().floor() + 1.0).exp2();
-        for bezier in chains.iter_mut().flat_map(|c| &mut c.pieces).map(|(b, _)| b) {
+        for bezier in chains
+            .iter_mut()
+            .flat_map(|c| &mut c.pieces)
+            .map(|(b, _)| b)
+        {
             for p in &mut bezier.points {
                 p[0] = p[0].scale_by_power_of_two(1.0 / unit);
                 p[1] = p[1].scale_by_power_of_two(1.0 / unit);
@@ -109,7 +122,19 @@ impl Region {
                 *radius = radius.scale_by_power_of_two(1.0 / unit);
             }
         }
-        let cut: Vec<Vec<Cut>> = chains.iter().map(|c| c.pieces.iter().map(|(b, curve)| Cut { bezier: b, curve: *curve, at: piece::cuts(b) }).collect()).collect();
+        let cut: Vec<Vec<Cut>> = chains
+            .iter()
+            .map(|c| {
+                c.pieces
+                    .iter()
+                    .map(|(b, curve)| Cut {
+                        bezier: b,
+                        curve: *curve,
+                        at: piece::cuts(b),
+                    })
+                    .collect()
+            })
+            .collect();
         let size = profile_size(&cut);
         let mut pieces = Vec::new();
         for (i, cuts) in cut.iter().enumerate() {
@@ -130,7 +155,15 @@ impl Region {
                 at[1] * unit
             ));
         }
-        Ok(Self { unit, size, fill, pieces, crossings, boundary: outcome.pieces, warnings })
+        Ok(Self {
+            unit,
+            size,
+            fill,
+            pieces,
+            crossings,
+            boundary: outcome.pieces,
+            warnings,
+        })
     }
 
     /// The length of the region's unit in scene units, a power of two.
@@ -175,7 +208,12 @@ impl Region {
     /// Whether the closed region holds the point (r, z), r >= 0, given exactly by its f64s.
     #[must_use]
     pub fn contains(&self, r: f64, z: f64) -> bool {
-        let p = MeridianPoint { r, z, r_error: 0.0, z_error: 0.0 };
+        let p = MeridianPoint {
+            r,
+            z,
+            r_error: 0.0,
+            z_error: 0.0,
+        };
         self.contains_point(p, || [Dd::of(r), Dd::of(z)])
     }
 
@@ -201,10 +239,21 @@ fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain, RegionError> 
     }
     let mut pieces = Vec::new();
     for (i, c) in curves.iter().enumerate() {
-        let made = curve::beziers(c).map_err(|reason| RegionError::Curve { loop_index, curve: i, reason })?;
-        let finite = made.iter().flat_map(|b| b.points.iter().flatten()).all(|v| v.f64().is_finite() && v.lo().is_finite());
+        let made = curve::beziers(c).map_err(|reason| RegionError::Curve {
+            loop_index,
+            curve: i,
+            reason,
+        })?;
+        let finite = made
+            .iter()
+            .flat_map(|b| b.points.iter().flatten())
+            .all(|v| v.f64().is_finite() && v.lo().is_finite());
         if !finite || made.is_empty() {
-            return Err(RegionError::Curve { loop_index, curve: i, reason: "is beyond what f64 can evaluate; use coordinates nearer to 1".into() });
+            return Err(RegionError::Curve {
+                loop_index,
+                curve: i,
+                reason: "is beyond what f64 can evaluate; use coordinates nearer to 1".into(),
+            });
         }
         pieces.extend(made.into_iter().map(|b| (b, i)));
     }
@@ -240,7 +289,14 @@ fn profile_size(loops: &[Vec<Cut>]) -> f64 {
 }
 
 /// Adds the bi-monotone pieces of one loop, its gaps closed.
-fn assemble(loop_index: usize, cuts: &[Cut], open: bool, size: f64, unit: f64, pieces: &mut Vec<Piece>) -> Result<(), RegionError> {
+fn assemble(
+    loop_index: usize,
+    cuts: &[Cut],
+    open: bool,
+    size: f64,
+    unit: f64,
+    pieces: &mut Vec<Piece>,
+) -> Result<(), RegionError> {
     let allowed = GAP * size;
     let first = pieces.len();
     for (i, cut) in cuts.iter().enumerate() {
@@ -265,7 +321,10 @@ fn assemble(loop_index: usize, cuts: &[Cut], open: bool, size: f64, unit: f64, p
         push_segment(above_axis(a), above_axis(b), loop_index, pieces);
     }
     if open {
-        let (a, b) = (above_axis(cuts[0].start()), above_axis(cuts[cuts.len() - 1].end()));
+        let (a, b) = (
+            above_axis(cuts[0].start()),
+            above_axis(cuts[cuts.len() - 1].end()),
+        );
         let (foot_a, foot_b) = ([Dd::ZERO, a[1]], [Dd::ZERO, b[1]]);
         push_segment(b, foot_b, loop_index, pieces);
         push_segment(foot_b, foot_a, loop_index, pieces);
@@ -288,10 +347,19 @@ fn above_axis(p: [Dd; 2]) -> [Dd; 2] {
     [if p[0] < Dd::ZERO { Dd::ZERO } else { p[0] }, p[1]]
 }
 
-fn add_pieces(loop_index: usize, cut: &Cut, size: f64, unit: f64, pieces: &mut Vec<Piece>) -> Result<(), RegionError> {
+fn add_pieces(
+    loop_index: usize,
+    cut: &Cut,
+    size: f64,
+    unit: f64,
+    pieces: &mut Vec<Piece>,
+) -> Result<(), RegionError> {
     let [u0, u1] = cut.bezier.interval;
-    if let Some((t, p)) = cut.at.iter().min_by(|a, b| a.1[0].partial_cmp(&b.1[0]).expect("coordinates are numbers"))
-        && p[0].f64() < -BELOW_AXIS * size
+    if let Some((t, p)) = cut.at.iter().min_by(|a, b| {
+        a.1[0]
+            .partial_cmp(&b.1[0])
+            .expect("coordinates are numbers")
+    }) && p[0].f64() < -BELOW_AXIS * size
     {
         return Err(RegionError::BelowAxis {
             loop_index,
@@ -301,7 +369,13 @@ fn add_pieces(loop_index: usize, cut: &Cut, size: f64, unit: f64, pieces: &mut V
             allowed: -BELOW_AXIS * size * unit,
         });
     }
-    let whole = Piece::new(cut.bezier.points.clone(), cut.start(), cut.end(), loop_index, cut.bezier.circle);
+    let whole = Piece::new(
+        cut.bezier.points.clone(),
+        cut.start(),
+        cut.end(),
+        loop_index,
+        cut.bezier.circle,
+    );
     for w in cut.at.windows(2) {
         let ((a, from), (b, to)) = (w[0], w[1]);
         let middle = whole.at((a + b) * Dd::of(0.5));
@@ -330,7 +404,8 @@ fn tabulate(pieces: &mut [Piece]) {
     #[allow(clippy::cast_precision_loss, reason = "a small count")]
     let parameters: [f64; TABLE + 1] = std::array::from_fn(|i| i as f64 / TABLE as f64);
     for piece in pieces.iter_mut().filter(|p| p.degree() > 1) {
-        let table = KnotVector::bezier(piece.degree()).and_then(|knots| cache.table(&knots, &parameters, 0));
+        let table = KnotVector::bezier(piece.degree())
+            .and_then(|knots| cache.table(&knots, &parameters, 0));
         let (mut r, mut z) = ([0.0; TABLE + 1], [0.0; TABLE + 1]);
         let filled = table.and_then(|table| {
             let [wr, wz, w] = &piece.twin.coefficients;

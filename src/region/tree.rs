@@ -8,10 +8,16 @@ pub(crate) struct Box2 {
 }
 
 impl Box2 {
-    pub(crate) const EMPTY: Self = Self { min: [f64::INFINITY; 2], max: [f64::NEG_INFINITY; 2] };
+    pub(crate) const EMPTY: Self = Self {
+        min: [f64::INFINITY; 2],
+        max: [f64::NEG_INFINITY; 2],
+    };
 
     pub(crate) fn around(a: [f64; 2], b: [f64; 2]) -> Self {
-        Self { min: [a[0].min(b[0]), a[1].min(b[1])], max: [a[0].max(b[0]), a[1].max(b[1])] }
+        Self {
+            min: [a[0].min(b[0]), a[1].min(b[1])],
+            max: [a[0].max(b[0]), a[1].max(b[1])],
+        }
     }
 
     pub(crate) fn union(&self, o: &Self) -> Self {
@@ -22,11 +28,17 @@ impl Box2 {
     }
 
     pub(crate) fn grown(&self, by: f64) -> Self {
-        Self { min: [self.min[0] - by, self.min[1] - by], max: [self.max[0] + by, self.max[1] + by] }
+        Self {
+            min: [self.min[0] - by, self.min[1] - by],
+            max: [self.max[0] + by, self.max[1] + by],
+        }
     }
 
     pub(crate) fn overlaps(&self, o: &Self) -> bool {
-        self.min[0] <= o.max[0] && o.min[0] <= self.max[0] && self.min[1] <= o.max[1] && o.min[1] <= self.max[1]
+        self.min[0] <= o.max[0]
+            && o.min[0] <= self.max[0]
+            && self.min[1] <= o.max[1]
+            && o.min[1] <= self.max[1]
     }
 
     /// Squared distance from a point to the box, 0 inside.
@@ -61,27 +73,51 @@ impl BoxTree {
     pub(crate) fn new(boxes: &[Box2]) -> Self {
         #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
         let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
-        let mut nodes = vec![Node { bounds: Box2::EMPTY, first: 0, count: 0 }];
+        let mut nodes = vec![Node {
+            bounds: Box2::EMPTY,
+            first: 0,
+            count: 0,
+        }];
         // (node, range of items), depth first; the median split keeps the depth logarithmic.
         let mut work = vec![(0_usize, 0_usize, items.len())];
         while let Some((node, from, to)) = work.pop() {
             let run = &mut items[from..to];
-            let bounds = run.iter().fold(Box2::EMPTY, |b, &i| b.union(&boxes[i as usize]));
+            let bounds = run
+                .iter()
+                .fold(Box2::EMPTY, |b, &i| b.union(&boxes[i as usize]));
             #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
             if run.len() <= LEAF {
-                nodes[node] = Node { bounds, first: from as u32, count: run.len() as u32 };
+                nodes[node] = Node {
+                    bounds,
+                    first: from as u32,
+                    count: run.len() as u32,
+                };
                 continue;
             }
             let axis = usize::from(bounds.max[1] - bounds.min[1] > bounds.max[0] - bounds.min[0]);
             let centre = |i: u32| boxes[i as usize].min[axis] + boxes[i as usize].max[axis];
             let middle = run.len() / 2;
-            run.select_nth_unstable_by(middle, |&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
+            run.select_nth_unstable_by(middle, |&a, &b| {
+                centre(a).total_cmp(&centre(b)).then(a.cmp(&b))
+            });
             let child = nodes.len();
             #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
             let first = child as u32;
-            nodes[node] = Node { bounds, first, count: 0 };
-            nodes.push(Node { bounds, first: 0, count: 0 });
-            nodes.push(Node { bounds, first: 0, count: 0 });
+            nodes[node] = Node {
+                bounds,
+                first,
+                count: 0,
+            };
+            nodes.push(Node {
+                bounds,
+                first: 0,
+                count: 0,
+            });
+            nodes.push(Node {
+                bounds,
+                first: 0,
+                count: 0,
+            });
             work.push((child, from, from + middle));
             work.push((child + 1, from + middle, to));
         }
@@ -112,7 +148,12 @@ impl BoxTree {
     /// Visits items in the order of rising box distance from `p`, as far as `limit` (squared),
     /// which `visit` lowers and returns.
     #[inline]
-    pub(crate) fn visit_nearest(&self, p: [f64; 2], mut limit: f64, mut visit: impl FnMut(u32, f64) -> f64) {
+    pub(crate) fn visit_nearest(
+        &self,
+        p: [f64; 2],
+        mut limit: f64,
+        mut visit: impl FnMut(u32, f64) -> f64,
+    ) {
         if self.items.is_empty() {
             return;
         }
@@ -130,7 +171,9 @@ impl BoxTree {
                 continue;
             }
             let a = self.nodes[node.first as usize].bounds.distance_squared(p);
-            let b = self.nodes[node.first as usize + 1].bounds.distance_squared(p);
+            let b = self.nodes[node.first as usize + 1]
+                .bounds
+                .distance_squared(p);
             // The nearer child goes on top of the stack.
             if a <= b {
                 stack.push((b, node.first + 1));

@@ -30,12 +30,27 @@ pub(super) struct FractionSampler {
 
 impl FractionSampler {
     pub(super) fn new(assembly: &Assembly, sides: DVec3) -> Self {
-        let shapes = assembly.bodies().iter().map(|b| CellShape::new(b.frame(), sides)).collect();
-        Self { sides, shapes, reach: reach(sides) }
+        let shapes = assembly
+            .bodies()
+            .iter()
+            .map(|b| CellShape::new(b.frame(), sides))
+            .collect();
+        Self {
+            sides,
+            shapes,
+            reach: reach(sides),
+        }
     }
 
     /// Fills one row and returns the sum of its fractions.
-    pub(super) fn row(&self, assembly: &Assembly, grid: &GridSpec, [j, k]: [usize; 2], flags: &[Vec<u8>], out: &mut [f32]) -> f64 {
+    pub(super) fn row(
+        &self,
+        assembly: &Assembly,
+        grid: &GridSpec,
+        [j, k]: [usize; 2],
+        flags: &[Vec<u8>],
+        out: &mut [f32],
+    ) -> f64 {
         let bodies = assembly.bodies();
         let step = grid.spacing().x;
         // Beyond this many steps no distance is worth measuring.
@@ -48,7 +63,11 @@ impl FractionSampler {
             touched.clear();
             let mut full = false;
             for (b, body) in bodies.iter().enumerate() {
-                let inside = assembly.parts().iter().zip(flags).any(|(p, f)| p.body() == b && f[i] != 0);
+                let inside = assembly
+                    .parts()
+                    .iter()
+                    .zip(flags)
+                    .any(|(p, f)| p.body() == b && f[i] != 0);
                 if clear[b] == 0 {
                     let d = body.distance(centre, inside, horizon);
                     if d < self.reach {
@@ -56,7 +75,11 @@ impl FractionSampler {
                         continue;
                     }
                     // The next voxels within this distance stay clear of the surface.
-                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 16")]
+                    #[allow(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "at most 16"
+                    )]
                     let steps = ((d - self.reach) / step * (1.0 - 1e-9)) as usize;
                     clear[b] = steps;
                 } else {
@@ -71,7 +94,10 @@ impl FractionSampler {
                 several => union_share(assembly, several, centre, self.sides),
             };
             sum += share;
-            #[allow(clippy::cast_possible_truncation, reason = "a share is between 0 and 1")]
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a share is between 0 and 1"
+            )]
             {
                 *value = share as f32;
             }
@@ -131,14 +157,24 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
         let half = cell.sides * 0.5;
         for n in 0..8 {
             let side = |bit: u32| if n >> bit & 1 == 1 { 0.5 } else { -0.5 };
-            let part = bounded(assembly, bodies, cell.centre + half * DVec3::new(side(0), side(1), side(2)), half);
+            let part = bounded(
+                assembly,
+                bodies,
+                cell.centre + half * DVec3::new(side(0), side(1), side(2)),
+                half,
+            );
             gap += part.gap();
             heap.push(part);
         }
     }
     // In a fixed order, so that the sum does not depend on the heap's.
     let mut cells = heap.into_vec();
-    cells.sort_by(|a, b| a.centre.to_array().map(f64::to_bits).cmp(&b.centre.to_array().map(f64::to_bits)));
+    cells.sort_by(|a, b| {
+        a.centre
+            .to_array()
+            .map(f64::to_bits)
+            .cmp(&b.centre.to_array().map(f64::to_bits))
+    });
     (cells.iter().map(|c| 0.5 * (c.low + c.high)).sum::<f64>() / whole).clamp(0.0, 1.0)
 }
 
@@ -147,7 +183,10 @@ fn bounded(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3) -
     let (mut low, mut high) = (0.0_f64, 0.0_f64);
     for &b in bodies {
         let body = &assembly.bodies()[b];
-        let inside = assembly.parts().iter().any(|p| p.body() == b && p.contains(centre));
+        let inside = assembly
+            .parts()
+            .iter()
+            .any(|p| p.body() == b && p.contains(centre));
         let share = if body.distance(centre, inside, reach(sides)) >= reach(sides) {
             f64::from(u8::from(inside))
         } else {
@@ -156,16 +195,33 @@ fn bounded(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3) -
         low = low.max(share);
         high += share;
     }
-    Cell { centre, sides, low: low * volume, high: high.min(1.0) * volume }
+    Cell {
+        centre,
+        sides,
+        low: low * volume,
+        high: high.min(1.0) * volume,
+    }
 }
 
 /// Cuts a voxel at the flat faces normal to a grid axis, where faces of two bodies may coincide
 /// and halving would never separate them.
-fn flat_faces_apart(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3) -> Vec<(DVec3, DVec3)> {
+fn flat_faces_apart(
+    assembly: &Assembly,
+    bodies: &[usize],
+    centre: DVec3,
+    sides: DVec3,
+) -> Vec<(DVec3, DVec3)> {
     let mut cells = vec![(centre, sides)];
     for axis in 0..3 {
-        let (low, high) = (centre[axis] - 0.5 * sides[axis], centre[axis] + 0.5 * sides[axis]);
-        let mut cuts: Vec<f64> = bodies.iter().flat_map(|&b| assembly.bodies()[b].flat_faces(axis)).filter(|&c| c > low && c < high).collect();
+        let (low, high) = (
+            centre[axis] - 0.5 * sides[axis],
+            centre[axis] + 0.5 * sides[axis],
+        );
+        let mut cuts: Vec<f64> = bodies
+            .iter()
+            .flat_map(|&b| assembly.bodies()[b].flat_faces(axis))
+            .filter(|&c| c > low && c < high)
+            .collect();
         cuts.push(low);
         cuts.push(high);
         cuts.sort_by(f64::total_cmp);

@@ -35,7 +35,12 @@ impl Selection {
     #[must_use]
     pub fn of(channels: &[Channel], band: Option<f64>) -> Self {
         let has = |c| channels.contains(&c);
-        Self { fraction: has(Channel::Fraction), sdf: has(Channel::Sdf), material: has(Channel::Material), band }
+        Self {
+            fraction: has(Channel::Fraction),
+            sdf: has(Channel::Sdf),
+            material: has(Channel::Material),
+            band,
+        }
     }
 }
 
@@ -79,15 +84,25 @@ impl<'a> LayerSampler<'a> {
     /// A sampler of `assembly` on `grid`.
     #[must_use]
     pub fn new(assembly: &'a Assembly, grid: &'a GridSpec, selection: Selection) -> Self {
-        let fractions = selection.fraction.then(|| FractionSampler::new(assembly, grid.spacing()));
-        Self { assembly, grid, selection, fractions }
+        let fractions = selection
+            .fraction
+            .then(|| FractionSampler::new(assembly, grid.spacing()));
+        Self {
+            assembly,
+            grid,
+            selection,
+            fractions,
+        }
     }
 
     /// Bytes that one layer's buffers take.
     #[must_use]
     pub fn bytes_per_layer(grid: &GridSpec, selection: &Selection) -> u64 {
         let each = |on: bool, bytes: u64| if on { bytes } else { 0 };
-        grid.layer_len() as u64 * (1 + each(selection.fraction, 4) + each(selection.sdf, 4) + each(selection.material, 4))
+        grid.layer_len() as u64
+            * (1 + each(selection.fraction, 4)
+                + each(selection.sdf, 4)
+                + each(selection.material, 4))
     }
 
     /// Fills `out` with layer `k`.
@@ -103,7 +118,8 @@ impl<'a> LayerSampler<'a> {
         resized(&mut out.fraction, self.selection.fraction);
         resized(&mut out.sdf, self.selection.sdf);
         out.material.clear();
-        out.material.resize(if self.selection.material { n } else { 0 }, 0);
+        out.material
+            .resize(if self.selection.material { n } else { 0 }, 0);
         out.inside = 0;
         out.fraction_sum = 0.0;
 
@@ -115,7 +131,10 @@ impl<'a> LayerSampler<'a> {
             distances: vec![f64::INFINITY; bodies],
             limits: vec![f64::INFINITY; bodies],
         };
-        let layers: Vec<LayerCuts> = parts.iter().map(|p| p.rows().layer(self.grid.centre(0, 0, k))).collect();
+        let layers: Vec<LayerCuts> = parts
+            .iter()
+            .map(|p| p.rows().layer(self.grid.centre(0, 0, k)))
+            .collect();
         for j in 0..ny {
             self.flag_row(j, k, &layers, &mut scratch);
             let range = j * nx..(j + 1) * nx;
@@ -140,7 +159,13 @@ impl<'a> LayerSampler<'a> {
                 self.distance_row(j, k, &mut scratch, &mut out.sdf[range.clone()]);
             }
             if let Some(fractions) = &self.fractions {
-                out.fraction_sum += fractions.row(self.assembly, self.grid, [j, k], &scratch.flags, &mut out.fraction[range]);
+                out.fraction_sum += fractions.row(
+                    self.assembly,
+                    self.grid,
+                    [j, k],
+                    &scratch.flags,
+                    &mut out.fraction[range],
+                );
             }
         }
     }
@@ -149,8 +174,18 @@ impl<'a> LayerSampler<'a> {
     fn flag_row(&self, j: usize, k: usize, layers: &[LayerCuts], scratch: &mut Scratch) {
         let nx = self.grid.dims()[0];
         let first = self.grid.centre(0, j, k);
-        let row = Row { first, step: self.grid.spacing().x, count: nx };
-        for ((part, layer), flags) in self.assembly.parts().iter().zip(layers).zip(&mut scratch.flags) {
+        let row = Row {
+            first,
+            step: self.grid.spacing().x,
+            count: nx,
+        };
+        for ((part, layer), flags) in self
+            .assembly
+            .parts()
+            .iter()
+            .zip(layers)
+            .zip(&mut scratch.flags)
+        {
             let b = part.bounds();
             let margin = 1e-9 * b.longest_side() + 64.0 * f64::EPSILON * first.abs().max_element();
             let misses = |c: usize| first[c] < b.min[c] - margin || first[c] > b.max[c] + margin;
@@ -174,10 +209,17 @@ impl<'a> LayerSampler<'a> {
         for (i, value) in out.iter_mut().enumerate() {
             let point = self.grid.centre(i, j, k);
             let flags = &scratch.flags;
-            let within = |b: usize| parts.iter().zip(flags).any(|(p, f)| p.body() == b && f[i] != 0);
+            let within = |b: usize| {
+                parts
+                    .iter()
+                    .zip(flags)
+                    .any(|(p, f)| p.body() == b && f[i] != 0)
+            };
             scratch.distances.fill(f64::INFINITY);
             let distances = &mut scratch.distances;
-            let d = self.assembly.signed_distance_within(point, within, &scratch.limits, |b, d| distances[b] = d);
+            let d = self
+                .assembly
+                .signed_distance_within(point, within, &scratch.limits, |b, d| distances[b] = d);
             *value = to_f32(d.clamp(-band, band));
             // A distance changes by at most the step from voxel to voxel; a hair more covers the
             // rounding of the two.
@@ -190,7 +232,14 @@ impl<'a> LayerSampler<'a> {
 
 /// The stored form of a signed distance: nearest f32, but never across zero.
 fn to_f32(distance: f64) -> f32 {
-    #[allow(clippy::cast_possible_truncation, reason = "the one place where distances become f32")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "the one place where distances become f32"
+    )]
     let value = distance as f32;
-    if distance > 0.0 && value == 0.0 { f32::from_bits(1) } else { value + 0.0 }
+    if distance > 0.0 && value == 0.0 {
+        f32::from_bits(1)
+    } else {
+        value + 0.0
+    }
 }

@@ -1,7 +1,10 @@
 //! From a scene's data to its solid and its grid.
 
 use super::error::SceneError;
-use super::model::{self, CurveKind, CurveModel, GridStep, Operation, PlaceStep, ProfileModel, SceneModel, SolidKind, SolidModel};
+use super::model::{
+    self, CurveKind, CurveModel, GridStep, Operation, PlaceStep, ProfileModel, SceneModel,
+    SolidKind, SolidModel,
+};
 use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
@@ -57,7 +60,13 @@ impl Scene {
     /// # Errors
     /// [`Error::Scene`] when the scene cannot be.
     pub fn parse(toml: &str) -> Result<Self, Error> {
-        Self::from_model(super::parse_model(toml, super::SceneFormat::Toml, "<text>", Path::new(""), &[])?)
+        Self::from_model(super::parse_model(
+            toml,
+            super::SceneFormat::Toml,
+            "<text>",
+            Path::new(""),
+            &[],
+        )?)
     }
 
     /// The solid and grid of a scene's data.
@@ -73,21 +82,38 @@ impl Scene {
             if solid.operation != Operation::Add {
                 let wanted = "\"add\"";
                 let hint = format!("{} is not built yet", solid.operation.name());
-                return Err(model.error(solid.place, &format!("{}.operation", solid.path), Some(format!("{:?}", solid.operation.name())), wanted, Some(hint)).into());
+                return Err(model
+                    .error(
+                        solid.place,
+                        &format!("{}.operation", solid.path),
+                        Some(format!("{:?}", solid.operation.name())),
+                        wanted,
+                        Some(hint),
+                    )
+                    .into());
             }
             let region = if let Some(region) = regions.get(profile) {
                 region.clone()
             } else {
                 let (name, data) = &model.profiles[*profile];
                 let region = region(data).map_err(|e| placed(&model, data, &e))?;
-                warnings.extend(region.warnings().iter().map(|w| format!("profiles.{name}: {w}")));
+                warnings.extend(
+                    region
+                        .warnings()
+                        .iter()
+                        .map(|w| format!("profiles.{name}: {w}")),
+                );
                 let region = Arc::new(region);
                 regions.insert(*profile, region.clone());
                 region
             };
             parts.push(part(&model, solid, region)?);
         }
-        Ok(Self { assembly: Assembly::new(parts), model, warnings })
+        Ok(Self {
+            assembly: Assembly::new(parts),
+            model,
+            warnings,
+        })
     }
 
     /// The scene's data.
@@ -137,7 +163,9 @@ impl Scene {
     /// BLAKE3 of the resolved scene, in hexadecimal.
     #[must_use]
     pub fn hash(&self) -> String {
-        blake3::hash(self.model.resolve().to_string().as_bytes()).to_hex().to_string()
+        blake3::hash(self.model.resolve().to_string().as_bytes())
+            .to_hex()
+            .to_string()
     }
 
     /// The grid that the scene asks for.
@@ -147,20 +175,42 @@ impl Scene {
     pub fn grid(&self) -> Result<GridSpec, Error> {
         self.grid_within().map_err(|e| {
             let wanted = "a grid that can be numbered";
-            self.model.error(self.model.grid.place, "grid", Some(e.to_string()), wanted, Some("lower the resolution or change the bounds".into())).into()
+            self.model
+                .error(
+                    self.model.grid.place,
+                    "grid",
+                    Some(e.to_string()),
+                    wanted,
+                    Some("lower the resolution or change the bounds".into()),
+                )
+                .into()
         })
     }
 
     fn grid_within(&self) -> Result<GridSpec, GridError> {
         let asked = &self.model.grid;
         let (bounds, padding) = match asked.bounds {
-            Some([min, max]) => (Aabb { min: DVec3::from(min), max: DVec3::from(max) }, 0),
+            Some([min, max]) => (
+                Aabb {
+                    min: DVec3::from(min),
+                    max: DVec3::from(max),
+                },
+                0,
+            ),
             None => (self.bounds(), asked.padding),
         };
         let sides = bounds.sides();
         let spacing = match asked.step {
-            GridStep::Verbatim { origin, spacing, dims } => {
-                return GridSpec::new(dims.map(|d| d as usize), DVec3::from(origin), DVec3::from(spacing));
+            GridStep::Verbatim {
+                origin,
+                spacing,
+                dims,
+            } => {
+                return GridSpec::new(
+                    dims.map(|d| d as usize),
+                    DVec3::from(origin),
+                    DVec3::from(spacing),
+                );
             }
             GridStep::Resolution(n) => DVec3::splat(bounds.longest_side() / f64::from(n)),
             GridStep::Resolutions(n) => sides / DVec3::from(n.map(f64::from)),
@@ -172,9 +222,16 @@ impl Scene {
             let count = (sides[a] / spacing[a] - 1e-9).ceil().max(1.0);
             let found = count + 2.0 * f64::from(padding);
             if !(found <= GridSpec::MAX_DIM as f64) {
-                return Err(GridError::Dimension { axis: ['x', 'y', 'z'][a], found });
+                return Err(GridError::Dimension {
+                    axis: ['x', 'y', 'z'][a],
+                    found,
+                });
             }
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "checked just above"
+            )]
             {
                 dims[a] = found as usize;
             }
@@ -187,17 +244,28 @@ impl Scene {
     /// The half width of the narrow band in scene units, where the scene asks for one.
     #[must_use]
     pub fn band(&self, grid: &GridSpec) -> Option<f64> {
-        self.model.output.band.map(|voxels| voxels * grid.spacing().max_element())
+        self.model
+            .output
+            .band
+            .map(|voxels| voxels * grid.spacing().max_element())
     }
 }
 
 /// The loops of a profile: the chain first, where there is one.
 fn loops(profile: &ProfileModel) -> Vec<&[CurveModel]> {
-    profile.curves.iter().chain(&profile.loops).map(Vec::as_slice).collect()
+    profile
+        .curves
+        .iter()
+        .chain(&profile.loops)
+        .map(Vec::as_slice)
+        .collect()
 }
 
 fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
-    let loops: Vec<ProfileLoop> = loops(profile).into_iter().map(|l| l.iter().map(curve).collect()).collect();
+    let loops: Vec<ProfileLoop> = loops(profile)
+        .into_iter()
+        .map(|l| l.iter().map(curve).collect())
+        .collect();
     let boundary = match profile.boundary {
         model::Boundary::Closed => Boundary::Closed,
         model::Boundary::ToAxis => Boundary::ToAxis,
@@ -212,21 +280,70 @@ fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
 fn curve(curve: &CurveModel) -> ProfileCurve {
     let flat = |points: &[model::PointModel]| points.iter().map(|p| [p.r, p.z]).collect::<Vec<_>>();
     let made = match &curve.kind {
-        CurveKind::Nurbs { degree, points, weights, knots } => {
-            ProfileCurve::Nurbs { degree: *degree, knots: knots.clone(), points: flat(points), weights: weights.clone() }
-        }
+        CurveKind::Nurbs {
+            degree,
+            points,
+            weights,
+            knots,
+        } => ProfileCurve::Nurbs {
+            degree: *degree,
+            knots: knots.clone(),
+            points: flat(points),
+            weights: weights.clone(),
+        },
         CurveKind::Bezier { points, weights } => {
             let degree = points.len() - 1;
             let knots = [vec![0.0; degree + 1], vec![1.0; degree + 1]].concat();
-            ProfileCurve::Nurbs { degree, knots, points: flat(points), weights: weights.clone() }
+            ProfileCurve::Nurbs {
+                degree,
+                knots,
+                points: flat(points),
+                weights: weights.clone(),
+            }
         }
-        CurveKind::Polyline { points } => ProfileCurve::Polyline { points: flat(points) },
-        CurveKind::Arc { center, radius, from, to } => ProfileCurve::Arc { center: *center, radii: [*radius; 2], tilt: 0.0, from: *from, to: *to },
-        CurveKind::Circle { center, radius } => ProfileCurve::Arc { center: *center, radii: [*radius; 2], tilt: 0.0, from: 0.0, to: 360.0 },
-        CurveKind::Ellipse { center, radii, tilt } => ProfileCurve::Arc { center: *center, radii: *radii, tilt: *tilt, from: 0.0, to: 360.0 },
-        CurveKind::Interpolate { points, degree } => ProfileCurve::Interpolate { points: flat(points), degree: *degree },
+        CurveKind::Polyline { points } => ProfileCurve::Polyline {
+            points: flat(points),
+        },
+        CurveKind::Arc {
+            center,
+            radius,
+            from,
+            to,
+        } => ProfileCurve::Arc {
+            center: *center,
+            radii: [*radius; 2],
+            tilt: 0.0,
+            from: *from,
+            to: *to,
+        },
+        CurveKind::Circle { center, radius } => ProfileCurve::Arc {
+            center: *center,
+            radii: [*radius; 2],
+            tilt: 0.0,
+            from: 0.0,
+            to: 360.0,
+        },
+        CurveKind::Ellipse {
+            center,
+            radii,
+            tilt,
+        } => ProfileCurve::Arc {
+            center: *center,
+            radii: *radii,
+            tilt: *tilt,
+            from: 0.0,
+            to: 360.0,
+        },
+        CurveKind::Interpolate { points, degree } => ProfileCurve::Interpolate {
+            points: flat(points),
+            degree: *degree,
+        },
     };
-    if curve.reverse { ProfileCurve::Reversed(Box::new(made)) } else { made }
+    if curve.reverse {
+        ProfileCurve::Reversed(Box::new(made))
+    } else {
+        made
+    }
 }
 
 /// A region's error at its place in the scene.
@@ -235,50 +352,116 @@ fn placed(model: &SceneModel, profile: &ProfileModel, error: &RegionError) -> Sc
     let curve_at = |l: usize, c: usize| loops.get(l).and_then(|curves| curves.get(c));
     let name = |l: usize, c: usize| curve_at(l, c).map_or_else(String::new, |c| c.path.clone());
     let (place, path) = match error.place() {
-        Some((l, Some(c))) => curve_at(l, c).map_or((profile.place, profile.path.clone()), |c| (c.place, c.path.clone())),
+        Some((l, Some(c))) => curve_at(l, c).map_or((profile.place, profile.path.clone()), |c| {
+            (c.place, c.path.clone())
+        }),
         _ => (profile.place, profile.path.clone()),
     };
     let (found, wanted, hint) = match error {
-        RegionError::Gap { loop_index, curve, next, gap, at, allowed } => (
-            format!("a gap of {gap:e} between the end of {} at (r, z) = ({}, {}) and the start of {}", name(*loop_index, *curve), at[0], at[1], name(*loop_index, *next)),
+        RegionError::Gap {
+            loop_index,
+            curve,
+            next,
+            gap,
+            at,
+            allowed,
+        } => (
+            format!(
+                "a gap of {gap:e} between the end of {} at (r, z) = ({}, {}) and the start of {}",
+                name(*loop_index, *curve),
+                at[0],
+                at[1],
+                name(*loop_index, *next)
+            ),
             format!("curves that meet within {allowed:e}"),
-            Some(if curve_at(*loop_index, *curve).is_some_and(|_| *next == 0) {
-                "add a closing curve, or use boundary = \"to-axis\" for an open chain".to_owned()
-            } else {
-                "move an end, or add a segment between them".to_owned()
-            }),
+            Some(
+                if curve_at(*loop_index, *curve).is_some_and(|_| *next == 0) {
+                    "add a closing curve, or use boundary = \"to-axis\" for an open chain"
+                        .to_owned()
+                } else {
+                    "move an end, or add a segment between them".to_owned()
+                },
+            ),
         ),
-        RegionError::BelowAxis { r, parameter, allowed, .. } => {
-            (format!("r = {r:e} at parameter {parameter}"), format!("a curve with r >= {allowed:e}"), Some("move its control points to r >= 0".to_owned()))
-        }
-        RegionError::Curve { reason, .. } => (format!("a curve that {reason}"), "a curve that can be drawn".to_owned(), None),
-        _ => (error.to_string(), "curves that enclose an area".to_owned(), None),
+        RegionError::BelowAxis {
+            r,
+            parameter,
+            allowed,
+            ..
+        } => (
+            format!("r = {r:e} at parameter {parameter}"),
+            format!("a curve with r >= {allowed:e}"),
+            Some("move its control points to r >= 0".to_owned()),
+        ),
+        RegionError::Curve { reason, .. } => (
+            format!("a curve that {reason}"),
+            "a curve that can be drawn".to_owned(),
+            None,
+        ),
+        _ => (
+            error.to_string(),
+            "curves that enclose an area".to_owned(),
+            None,
+        ),
     };
     model.error(place, &path, Some(found), &wanted, hint)
 }
 
 fn part(model: &SceneModel, solid: &SolidModel, region: Arc<Region>) -> Result<Part, Error> {
-    let SolidKind::Revolve { angle, start, axis, .. } = &solid.kind;
+    let SolidKind::Revolve {
+        angle, start, axis, ..
+    } = &solid.kind;
     let direction = DVec3::from(axis.direction);
     let x = axis.x.map_or_else(|| default_x(direction), DVec3::from);
-    let refused = |what: &str, wanted: &str| Error::from(model.error(axis.place, &format!("{}.axis", solid.path), Some(what.to_owned()), wanted, None));
-    let mut frame = Similarity::from_axis(DVec3::from(axis.origin), direction, x)
-        .ok_or_else(|| refused("directions that span no frame", "a direction that is not zero and an x that is not parallel to it"))?;
+    let refused = |what: &str, wanted: &str| {
+        Error::from(model.error(
+            axis.place,
+            &format!("{}.axis", solid.path),
+            Some(what.to_owned()),
+            wanted,
+            None,
+        ))
+    };
+    let mut frame =
+        Similarity::from_axis(DVec3::from(axis.origin), direction, x).ok_or_else(|| {
+            refused(
+                "directions that span no frame",
+                "a direction that is not zero and an x that is not parallel to it",
+            )
+        })?;
     for step in &solid.steps {
         frame = match *step {
             PlaceStep::Scale(s) => frame.scaled(s),
-            PlaceStep::Rotate { axis, degrees } => {
-                frame.rotated(DVec3::from(axis), degrees).ok_or_else(|| refused("a rotation about nothing", "an axis that is not zero"))?
-            }
+            PlaceStep::Rotate { axis, degrees } => frame
+                .rotated(DVec3::from(axis), degrees)
+                .ok_or_else(|| refused("a rotation about nothing", "an axis that is not zero"))?,
             PlaceStep::Translate(by) => frame.translated(DVec3::from(by)),
         };
     }
-    let part = Part::new(solid.name.clone(), solid.material, region, &frame, Turn::new(*start, *angle));
+    let part = Part::new(
+        solid.name.clone(),
+        solid.material,
+        region,
+        &frame,
+        Turn::new(*start, *angle),
+    );
     let bounds = part.bounds();
     let size = bounds.longest_side();
-    if !(bounds.min.is_finite() && bounds.max.is_finite() && size > 0.0 && (1e-120..1e120).contains(&size)) {
+    if !(bounds.min.is_finite()
+        && bounds.max.is_finite()
+        && size > 0.0
+        && (1e-120..1e120).contains(&size))
+    {
         let found = format!("a solid of size {size:e}");
-        return Err(model.error(solid.place, &solid.path, Some(found), "a size between 1e-120 and 1e120", Some("change place.scale or the units".into())).into());
+        return Err(model
+            .error(
+                solid.place,
+                &solid.path,
+                Some(found),
+                "a size between 1e-120 and 1e120",
+                Some("change place.scale or the units".into()),
+            )
+            .into());
     }
     Ok(part)
 }
@@ -287,5 +470,9 @@ fn part(model: &SceneModel, solid: &SolidModel, region: Arc<Region>) -> Result<P
 fn default_x(direction: DVec3) -> DVec3 {
     let unit = direction / direction.abs().max_element();
     let sine = unit.y.hypot(unit.z) / unit.length();
-    if sine <= 1_f64.to_radians().sin() { DVec3::Y } else { DVec3::X }
+    if sine <= 1_f64.to_radians().sin() {
+        DVec3::Y
+    } else {
+        DVec3::X
+    }
 }

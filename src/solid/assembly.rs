@@ -41,14 +41,30 @@ pub struct Assembly {
 impl Part {
     /// A region turned about the third axis of `frame` (local lengths in scene units).
     #[must_use]
-    pub fn new(name: String, material: u32, region: Arc<Region>, frame: &Similarity, turn: Turn) -> Self {
+    pub fn new(
+        name: String,
+        material: u32,
+        region: Arc<Region>,
+        frame: &Similarity,
+        turn: Turn,
+    ) -> Self {
         let frame = frame.with_local_unit(region.unit());
         let body = Body::new(frame.clone(), turn.clone(), region.boundary().to_vec());
         let bounds = body.bounds();
         // Far wider than any rounding of the bounds, far narrower than the solid.
         let margin = 1e-9 * bounds.longest_side();
         let volume = body.volume();
-        Self { name, material, region, frame, turn, bounds, margin, body: 0, volume }
+        Self {
+            name,
+            material,
+            region,
+            frame,
+            turn,
+            bounds,
+            margin,
+            body: 0,
+            volume,
+        }
     }
 
     /// The part's name.
@@ -81,7 +97,12 @@ impl Part {
 
     /// The part as rows of voxels see it.
     pub(crate) fn rows(&self) -> RowSurface<'_> {
-        RowSurface { frame: &self.frame, turn: &self.turn, pieces: self.region.pieces(), tree: self.region.tree() }
+        RowSurface {
+            frame: &self.frame,
+            turn: &self.turn,
+            pieces: self.region.pieces(),
+            tree: self.region.tree(),
+        }
     }
 
     /// What a user should know about the part's profile.
@@ -95,7 +116,9 @@ impl Part {
     #[inline]
     pub fn contains(&self, point: DVec3) -> bool {
         let margin = self.margin + 64.0 * f64::EPSILON * point.abs().max_element();
-        if !(point.cmpge(self.bounds.min - margin).all() && point.cmple(self.bounds.max + margin).all()) {
+        if !(point.cmpge(self.bounds.min - margin).all()
+            && point.cmple(self.bounds.max + margin).all())
+        {
             return false;
         }
         let local = self.frame.to_local(point);
@@ -114,7 +137,12 @@ impl Part {
             }
         }
         let rho = flat.x.hypot(flat.y);
-        let meridian = MeridianPoint { r: rho, z: p.z, r_error: flat_error + 4.0 * f64::EPSILON * rho, z_error: local.error.z };
+        let meridian = MeridianPoint {
+            r: rho,
+            z: p.z,
+            r_error: flat_error + 4.0 * f64::EPSILON * rho,
+            z_error: local.error.z,
+        };
         self.region.contains_point(meridian, || {
             let e = exact.unwrap_or_else(|| self.frame.to_local_exact(point));
             [(e[0] * e[0] + e[1] * e[1]).sqrt(), e[2]]
@@ -129,11 +157,17 @@ impl Assembly {
     /// When there is no part.
     #[must_use]
     pub fn new(mut parts: Vec<Part>) -> Self {
-        let first = parts.first().expect("an assembly has at least one part").bounds;
+        let first = parts
+            .first()
+            .expect("an assembly has at least one part")
+            .bounds;
         let bounds = parts.iter().fold(first, |b, p| b.union(&p.bounds));
         let mut groups: Vec<Vec<usize>> = Vec::new();
         for i in 0..parts.len() {
-            match groups.iter_mut().find(|g| coaxial(&parts[g[0]], &parts[i]).is_some()) {
+            match groups
+                .iter_mut()
+                .find(|g| coaxial(&parts[g[0]], &parts[i]).is_some())
+            {
                 Some(group) => group.push(i),
                 None => groups.push(vec![i]),
             }
@@ -145,7 +179,11 @@ impl Assembly {
             }
             bodies.push(joined(&parts, &group));
         }
-        Self { parts, bodies, bounds }
+        Self {
+            parts,
+            bodies,
+            bounds,
+        }
     }
 
     /// The parts, in order.
@@ -175,7 +213,11 @@ impl Assembly {
     /// The material at the point: that of the last part holding it, 0 outside.
     #[must_use]
     pub fn material(&self, point: DVec3) -> u32 {
-        self.parts.iter().rev().find(|p| p.contains(point)).map_or(0, |p| p.material)
+        self.parts
+            .iter()
+            .rev()
+            .find(|p| p.contains(point))
+            .map_or(0, |p| p.material)
     }
 
     /// Signed distance, negative inside, in scene units.
@@ -192,7 +234,13 @@ impl Assembly {
     /// Signed distance where it is known which bodies hold the point, and no further from each
     /// body than its limit. `found` receives the unsigned distance to each body that was measured.
     #[inline]
-    pub(crate) fn signed_distance_within(&self, point: DVec3, inside: impl Fn(usize) -> bool, limits: &[f64], mut found: impl FnMut(usize, f64)) -> f64 {
+    pub(crate) fn signed_distance_within(
+        &self,
+        point: DVec3,
+        inside: impl Fn(usize) -> bool,
+        limits: &[f64],
+        mut found: impl FnMut(usize, f64),
+    ) -> f64 {
         let mut depth = f64::NEG_INFINITY;
         let mut gap = f64::INFINITY;
         for (b, body) in self.bodies.iter().enumerate() {
@@ -246,7 +294,10 @@ fn coaxial(a: &Part, b: &Part) -> Option<(Dd, Dd, Dd)> {
                 let (x, y) = (p.frame.axis_exact(0), p.frame.axis_exact(1));
                 std::array::from_fn(|i| x[i] * d[0] + y[i] * d[1])
             };
-            !differs(world(a, s.directions_exact()[0]), world(b, t.directions_exact()[0]))
+            !differs(
+                world(a, s.directions_exact()[0]),
+                world(b, t.directions_exact()[0]),
+            )
         }
         _ => false,
     };
@@ -261,10 +312,18 @@ fn coaxial(a: &Part, b: &Part) -> Option<(Dd, Dd, Dd)> {
 fn joined(parts: &[Part], group: &[usize]) -> Body {
     let host = &parts[group[0]];
     if group.len() == 1 {
-        return Body::new(host.frame.clone(), host.turn.clone(), host.region.boundary().to_vec());
+        return Body::new(
+            host.frame.clone(),
+            host.turn.clone(),
+            host.region.boundary().to_vec(),
+        );
     }
     // The largest part sets the unit, so that no coordinate leaves the unit square by much.
-    let host = group.iter().map(|&i| &parts[i]).max_by(|a, b| a.frame.scale().total_cmp(&b.frame.scale())).unwrap_or(host);
+    let host = group
+        .iter()
+        .map(|&i| &parts[i])
+        .max_by(|a, b| a.frame.scale().total_cmp(&b.frame.scale()))
+        .unwrap_or(host);
     let mut pieces: Vec<Piece> = Vec::new();
     let mut owner = Vec::new();
     for (slot, &i) in group.iter().enumerate() {
@@ -274,6 +333,11 @@ fn joined(parts: &[Part], group: &[usize]) -> Body {
         owner.resize(pieces.len(), slot);
     }
     // Each operand is the cleaned boundary of its own region, for which parity is membership.
-    let outcome = filled_boundary(&pieces, &|w| w.iter().any(|w| w.crossings % 2 == 1), &|i| owner[i], group.len());
+    let outcome = filled_boundary(
+        &pieces,
+        &|w| w.iter().any(|w| w.crossings % 2 == 1),
+        &|i| owner[i],
+        group.len(),
+    );
     Body::new(host.frame.clone(), host.turn.clone(), outcome.pieces)
 }

@@ -32,13 +32,27 @@ pub struct Body {
 
 impl Body {
     pub(crate) fn new(frame: Similarity, turn: Turn, boundary: Vec<BoundaryPiece>) -> Self {
-        let surface = DistanceSet::new(boundary.iter().filter(|p| !p.piece.on_axis).map(|p| &p.piece));
+        let surface = DistanceSet::new(
+            boundary
+                .iter()
+                .filter(|p| !p.piece.on_axis)
+                .map(|p| &p.piece),
+        );
         let section = DistanceSet::new(boundary.iter().map(|p| &p.piece));
         let bounds = bounds::bounds(&frame, &turn, &boundary);
         let closed = ClosedSection::new(boundary.iter().map(|b| b.piece.clone()).collect());
         let boxes: Vec<Box2> = boundary.iter().map(|b| b.piece.bounds).collect();
         let tree = BoxTree::new(&boxes);
-        Self { frame, turn, boundary, surface, section, closed, tree, bounds }
+        Self {
+            frame,
+            turn,
+            boundary,
+            surface,
+            section,
+            closed,
+            tree,
+            bounds,
+        }
     }
 
     /// The smallest box around the solid, in scene units.
@@ -65,7 +79,11 @@ impl Body {
             return Vec::new();
         }
         let flat = self.boundary.iter().filter(|b| b.piece.is_horizontal());
-        flat.map(|b| self.frame.to_world(DVec3::new(0.0, 0.0, b.piece.start[1].f64()))[axis]).collect()
+        flat.map(|b| {
+            self.frame
+                .to_world(DVec3::new(0.0, 0.0, b.piece.start[1].f64()))[axis]
+        })
+        .collect()
     }
 
     /// Unsigned distance from a point to the solid's surface, or `limit` where nothing is nearer.
@@ -85,7 +103,11 @@ impl Body {
             Turn::Full => self.surface.distance([rho, p.z], limit_here),
             Turn::Partial(wedge) => self.wedge_distance(wedge, p, rho, inside, limit_here),
         };
-        if found < limit_here { found * scale } else { limit }
+        if found < limit_here {
+            found * scale
+        } else {
+            limit
+        }
     }
 
     fn wedge_distance(&self, wedge: &Wedge, p: DVec3, rho: f64, inside: bool, limit: f64) -> f64 {
@@ -115,7 +137,13 @@ impl Body {
 
     /// Calls `each` with the boundary pieces that reach heights between `low` and `high` at a
     /// radius of at least `near`.
-    pub(crate) fn boundary_near(&self, low: f64, high: f64, near: f64, mut each: impl FnMut(&BoundaryPiece)) {
+    pub(crate) fn boundary_near(
+        &self,
+        low: f64,
+        high: f64,
+        near: f64,
+        mut each: impl FnMut(&BoundaryPiece),
+    ) {
         let wanted = |b: &Box2| b.max[1] >= low && b.min[1] <= high && b.max[0] >= near;
         self.tree.visit(wanted, |i| {
             let part = &self.boundary[i as usize];
@@ -130,7 +158,10 @@ impl Body {
     pub fn volume(&self) -> Integral {
         let ring = filled_integral(&self.boundary);
         let factor = 0.5 * self.turn.radians() * self.frame.scale().powi(3);
-        Integral { value: ring.value * factor, error: ring.error * factor }
+        Integral {
+            value: ring.value * factor,
+            error: ring.error * factor,
+        }
     }
 }
 
@@ -138,5 +169,9 @@ impl Body {
 fn distance_to_far_box(bounds: &Aabb, p: DVec3) -> f64 {
     let d = p - 0.5 * (bounds.min + bounds.max);
     let largest = d.abs().max_element();
-    if largest.is_finite() { (d / largest).length() * largest } else { f64::MAX }
+    if largest.is_finite() {
+        (d / largest).length() * largest
+    } else {
+        f64::MAX
+    }
 }

@@ -55,7 +55,9 @@ fn largest_over_turn(turn: &Turn, v: [Dd; 2]) -> Dd {
 /// The largest a z + m r on the boundary.
 fn support(boundary: &[BoundaryPiece], a: Dd, m: Dd) -> Dd {
     let value = |p: [Dd; 2]| a * p[1] + m * p[0];
-    let ends = boundary.iter().flat_map(|b| [value(b.piece.start), value(b.piece.end)]);
+    let ends = boundary
+        .iter()
+        .flat_map(|b| [value(b.piece.start), value(b.piece.end)]);
     let mut best = ends.fold(Dd::of(f64::NEG_INFINITY), |m, v| if v > m { v } else { m });
     if a == Dd::ZERO || m == Dd::ZERO {
         return best;

@@ -42,12 +42,26 @@ pub(crate) struct CellShape {
     volume: f64,
 }
 
-const EDGES: [[usize; 2]; 12] = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+const EDGES: [[usize; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
 
 impl CellShape {
     /// The shape of a voxel with those side lengths (scene units) in a solid's frame.
     pub(crate) fn new(frame: &Similarity, sides: DVec3) -> Self {
-        let axes = [DVec3::X * sides.x, DVec3::Y * sides.y, DVec3::Z * sides.z].map(|v| frame.vector_to_local(v));
+        let axes = [DVec3::X * sides.x, DVec3::Y * sides.y, DVec3::Z * sides.z]
+            .map(|v| frame.vector_to_local(v));
         let corners: [DVec3; 8] = std::array::from_fn(|i| {
             let side = |bit: usize| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
             axes[0] * side(0) + axes[1] * side(1) + axes[2] * side(2)
@@ -60,17 +74,30 @@ impl CellShape {
             .windows(2)
             .map(|w| {
                 let z = 0.5 * (w[0] + w[1]);
-                let mut edges: Vec<([usize; 2], DVec2)> =
-                    EDGES.iter().filter(|e| (corners[e[0]].z < z) != (corners[e[1]].z < z)).map(|&e| (e, on_edge(&corners, e, z))).collect();
+                let mut edges: Vec<([usize; 2], DVec2)> = EDGES
+                    .iter()
+                    .filter(|e| (corners[e[0]].z < z) != (corners[e[1]].z < z))
+                    .map(|&e| (e, on_edge(&corners, e, z)))
+                    .collect();
                 #[allow(clippy::cast_precision_loss, reason = "at most six")]
                 let middle = edges.iter().map(|e| e.1).sum::<DVec2>() / edges.len() as f64;
-                edges.sort_by(|a, b| (a.1 - middle).to_angle().total_cmp(&(b.1 - middle).to_angle()));
+                edges.sort_by(|a, b| {
+                    (a.1 - middle)
+                        .to_angle()
+                        .total_cmp(&(b.1 - middle).to_angle())
+                });
                 edges.into_iter().map(|e| e.0).collect()
             })
             .collect();
         let volume = axes[0].cross(axes[1]).dot(axes[2]).abs();
         let upright = heights.len() == 2;
-        Self { corners, heights, slabs, upright, volume }
+        Self {
+            corners,
+            heights,
+            slabs,
+            upright,
+            volume,
+        }
     }
 
     /// Half the diagonal, in local lengths.
@@ -80,7 +107,10 @@ impl CellShape {
 
     /// The cross-section at height `z` within a slab, at a voxel centred on `centre`.
     fn polygon(&self, slab: usize, z: f64, centre: DVec2) -> Polygon {
-        self.slabs[slab].iter().map(|&e| on_edge(&self.corners, e, z) + centre).collect()
+        self.slabs[slab]
+            .iter()
+            .map(|&e| on_edge(&self.corners, e, z) + centre)
+            .collect()
     }
 }
 
@@ -113,7 +143,10 @@ fn within_turn(polygon: Polygon, turn: &Turn) -> Sections {
 }
 
 fn disc_area(sections: &Sections, r: f64) -> f64 {
-    sections.iter().map(|(p, sign)| sign * disc::polygon_disc_area(p, r)).sum()
+    sections
+        .iter()
+        .map(|(p, sign)| sign * disc::polygon_disc_area(p, r))
+        .sum()
 }
 
 impl Body {
@@ -137,7 +170,8 @@ impl Body {
 
     fn slab_volume(&self, shape: &CellShape, slab: usize, flat: DVec2, z: f64) -> f64 {
         let (bottom, top) = (shape.heights[slab], shape.heights[slab + 1]);
-        let sections_at = |h: f64| within_turn(shape.polygon(slab, h.clamp(bottom, top), flat), self.turn());
+        let sections_at =
+            |h: f64| within_turn(shape.polygon(slab, h.clamp(bottom, top), flat), self.turn());
         let fixed = shape.upright.then(|| sections_at(0.5 * (bottom + top)));
         let reach = shape.half_diagonal();
         let (near, far) = ((flat.length() - reach).max(0.0), flat.length() + reach);
@@ -149,7 +183,10 @@ impl Body {
             if sign == 0.0 || piece.on_axis {
                 return;
             }
-            let (low, high) = (piece.bounds.min[1].max(z + bottom), piece.bounds.max[1].min(z + top));
+            let (low, high) = (
+                piece.bounds.min[1].max(z + bottom),
+                piece.bounds.max[1].min(z + top),
+            );
             if low >= high {
                 return;
             }
@@ -166,7 +203,15 @@ impl Body {
                 // The polygon's area is quadratic in z: one panel is exact.
                 volume += sign * quadrature::panel(&mut |h| area(far * 2.0, h), low, high).value;
             } else {
-                volume += sign * piece_volume(part, low, high, breaks.as_deref(), TOLERANCE * shape.volume, &area);
+                volume += sign
+                    * piece_volume(
+                        part,
+                        low,
+                        high,
+                        breaks.as_deref(),
+                        TOLERANCE * shape.volume,
+                        &area,
+                    );
             }
         });
         volume
@@ -190,18 +235,33 @@ fn critical_radii(sections: &Sections) -> Vec<f64> {
 }
 
 /// ∫ area(r(z), z) |dz| along the part of a piece between two heights.
-fn piece_volume(part: &BoundaryPiece, low: f64, high: f64, breaks: Option<&[f64]>, tolerance: f64, area: &impl Fn(f64, f64) -> f64) -> f64 {
+fn piece_volume(
+    part: &BoundaryPiece,
+    low: f64,
+    high: f64,
+    breaks: Option<&[f64]>,
+    tolerance: f64,
+    area: &impl Fn(f64, f64) -> f64,
+) -> f64 {
     let piece = &part.piece;
     let rising = piece.direction() > 0;
     let at_height = |h: f64| parameter(part, 1, h);
-    let (a, b) = if rising { (at_height(low), at_height(high)) } else { (at_height(high), at_height(low)) };
+    let (a, b) = if rising {
+        (at_height(low), at_height(high))
+    } else {
+        (at_height(high), at_height(low))
+    };
     let mut cuts: SmallVec<[f64; 16]> = SmallVec::new();
     cuts.push(a);
     if let Some(radii) = breaks {
         let origin = piece.twin.origin[0];
         let (ra, rb) = (piece.twin.at(a)[0] + origin, piece.twin.at(b)[0] + origin);
         let inner = radii.iter().filter(|&&r| r > ra.min(rb) && r < ra.max(rb));
-        cuts.extend(inner.map(|&r| parameter(part, 0, r)).filter(|&t| t > a && t < b));
+        cuts.extend(
+            inner
+                .map(|&r| parameter(part, 0, r))
+                .filter(|&t| t > a && t < b),
+        );
         cuts.sort_by(f64::total_cmp);
     }
     cuts.push(b);
@@ -223,7 +283,9 @@ fn piece_volume(part: &BoundaryPiece, low: f64, high: f64, breaks: Option<&[f64]
         .filter(|c| c[1] > c[0])
         .map(|c| {
             let width = c[1] - c[0];
-            let smooth = |u: f64| integrand(c[0] + width * u * u * (3.0 - 2.0 * u)) * width * 6.0 * u * (1.0 - u);
+            let smooth = |u: f64| {
+                integrand(c[0] + width * u * u * (3.0 - 2.0 * u)) * width * 6.0 * u * (1.0 - u)
+            };
             quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256).value
         })
         .sum()
@@ -245,14 +307,24 @@ fn parameter(part: &BoundaryPiece, c: usize, v: f64) -> f64 {
         return (v - start) / (end - start);
     }
     let target = v - piece.twin.origin[c];
-    let value = |t: f64| if rising { piece.twin.at(t)[c] - target } else { target - piece.twin.at(t)[c] };
+    let value = |t: f64| {
+        if rising {
+            piece.twin.at(t)[c] - target
+        } else {
+            target - piece.twin.at(t)[c]
+        }
+    };
     let (mut lo, mut hi) = (0.0_f64, 1.0_f64);
     let (mut f_lo, mut f_hi) = (value(0.0).min(0.0), value(1.0).max(0.0));
     let close = 4.0 * f64::EPSILON * (f_hi - f_lo);
     // Illinois' rule: a secant that halves the value of the end it keeps.
     let mut side = 0;
     for _ in 0..100 {
-        let m = if f_hi > f_lo { lo - f_lo * (hi - lo) / (f_hi - f_lo) } else { 0.5 * (lo + hi) };
+        let m = if f_hi > f_lo {
+            lo - f_lo * (hi - lo) / (f_hi - f_lo)
+        } else {
+            0.5 * (lo + hi)
+        };
         let m = if m > lo && m < hi { m } else { 0.5 * (lo + hi) };
         if !(m > lo && m < hi) || hi - lo <= 1e-15 {
             break;

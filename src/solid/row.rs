@@ -56,7 +56,10 @@ impl Cuts {
             return;
         }
         #[allow(clippy::cast_possible_truncation, reason = "clamped to the row")]
-        let (from, to) = (a.max(-1.0).ceil() as i64 - 1, b.min(last + 1.0).floor() as i64 + 1);
+        let (from, to) = (
+            a.max(-1.0).ceil() as i64 - 1,
+            b.min(last + 1.0).floor() as i64 + 1,
+        );
         self.list.push((from, to));
     }
 
@@ -67,7 +70,11 @@ impl Cuts {
         let last = self.last;
         let mut emit = |a: i64, b: i64| {
             if a <= b {
-                #[allow(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "clamped to the row")]
+                #[allow(
+                    clippy::cast_sign_loss,
+                    clippy::cast_possible_truncation,
+                    reason = "clamped to the row"
+                )]
                 run(a.max(0) as usize, b.min(last) as usize);
             }
         };
@@ -129,7 +136,9 @@ impl RowSurface<'_> {
             |b| zf >= b.min[1] - margin && zf <= b.max[1] + margin,
             |i| {
                 let piece = &self.pieces[i as usize];
-                if piece.on_axis || !(zf >= piece.bounds.min[1] - margin && zf <= piece.bounds.max[1] + margin) {
+                if piece.on_axis
+                    || !(zf >= piece.bounds.min[1] - margin && zf <= piece.bounds.max[1] + margin)
+                {
                     return;
                 }
                 for end in [piece.start, piece.end] {
@@ -137,7 +146,11 @@ impl RowSurface<'_> {
                         add(end[0]);
                     }
                 }
-                let (low, high) = if piece.direction() > 0 { (piece.start[1], piece.end[1]) } else { (piece.end[1], piece.start[1]) };
+                let (low, high) = if piece.direction() > 0 {
+                    (piece.start[1], piece.end[1])
+                } else {
+                    (piece.end[1], piece.start[1])
+                };
                 if z > low && z < high {
                     add(piece.other_at(1, z));
                 }
@@ -176,7 +189,11 @@ impl RowSurface<'_> {
         // The rounding of the step, over the whole row.
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
         let error = error + 4.0 * f64::EPSILON * along.length() * row.count as f64;
-        LocalRow { start: first.point, along, error }
+        LocalRow {
+            start: first.point,
+            along,
+            error,
+        }
     }
 
     fn search(&self, local: &LocalRow, count: usize, cuts: &mut Cuts) {
@@ -204,7 +221,13 @@ fn search_piece(piece: &Piece, local: &LocalRow, range: [f64; 2], cuts: &mut Cut
     const DEPTH: u32 = 48;
     let absolute = |p: [f64; 2]| [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]];
     let mut work = smallvec::SmallVec::<[(f64, [f64; 2], f64, [f64; 2], u32); 32]>::new();
-    work.push((0.0, piece.start.map(Real::f64), 1.0, piece.end.map(Real::f64), 0));
+    work.push((
+        0.0,
+        piece.start.map(Real::f64),
+        1.0,
+        piece.end.map(Real::f64),
+        0,
+    ));
     let margin = piece.twin.error + 4.0 * f64::EPSILON;
     while let Some((s, a, t, b, depth)) = work.pop() {
         let min = [a[0].min(b[0]) - margin, a[1].min(b[1]) - margin];
@@ -232,7 +255,10 @@ fn search_piece(piece: &Piece, local: &LocalRow, range: [f64; 2], cuts: &mut Cut
 impl LocalRow {
     /// The parameters at which ρ <= r, as one interval: outward for `sign` +1, inward for -1.
     fn within_circle(&self, r: f64, sign: f64) -> Option<[f64; 2]> {
-        let (p, d) = (DVec2::new(self.start.x, self.start.y), DVec2::new(self.along.x, self.along.y));
+        let (p, d) = (
+            DVec2::new(self.start.x, self.start.y),
+            DVec2::new(self.along.x, self.along.y),
+        );
         let c = d.length_squared();
         let r = r + sign * self.error * 2.0;
         if !(r >= 0.0) {
@@ -240,7 +266,8 @@ impl LocalRow {
         }
         if c.sqrt() <= 1e-13 * self.along.length() {
             // Parallel to the axis: all or nothing, within the drift of the direction's rounding.
-            return (p.length() <= r * (1.0 + sign * 1e-12)).then_some([f64::NEG_INFINITY, f64::INFINITY]);
+            return (p.length() <= r * (1.0 + sign * 1e-12))
+                .then_some([f64::NEG_INFINITY, f64::INFINITY]);
         }
         let across = p.perp_dot(d);
         let a2 = across * across / c;
@@ -256,7 +283,9 @@ impl LocalRow {
 
     /// Parameters at which ρ lies between the two radii.
     fn circle_crossings(&self, [low, high]: [f64; 2], each: &mut impl FnMut(f64, f64)) {
-        let Some([a, b]) = self.within_circle(high, 1.0) else { return };
+        let Some([a, b]) = self.within_circle(high, 1.0) else {
+            return;
+        };
         match self.within_circle(low, -1.0) {
             Some([c, d]) if c < d => {
                 each(a, c);
@@ -268,7 +297,13 @@ impl LocalRow {
 
     /// Parameters within `range` at which (ρ, z) lies in the box, each interval grown by the
     /// rounding.
-    fn box_parameters(&self, min: [f64; 2], max: [f64; 2], range: [f64; 2], each: &mut impl FnMut(f64, f64)) {
+    fn box_parameters(
+        &self,
+        min: [f64; 2],
+        max: [f64; 2],
+        range: [f64; 2],
+        each: &mut impl FnMut(f64, f64),
+    ) {
         let [mut from, mut to] = range;
         let dz = self.along.z;
         let slack = 2.0 * self.error;
@@ -277,7 +312,10 @@ impl LocalRow {
                 return;
             }
         } else {
-            let (a, b) = ((min[1] - slack - self.start.z) / dz, (max[1] + slack - self.start.z) / dz);
+            let (a, b) = (
+                (min[1] - slack - self.start.z) / dz,
+                (max[1] + slack - self.start.z) / dz,
+            );
             from = from.max(a.min(b));
             to = to.min(a.max(b));
         }

@@ -35,7 +35,12 @@ impl Turn {
             let (s, c) = a.sin_cos_degrees();
             [c, s]
         };
-        Self::Partial(Wedge { start: direction(Dd::of(from)), end: direction(Dd::sum(from, degrees)), degrees, from })
+        Self::Partial(Wedge {
+            start: direction(Dd::of(from)),
+            end: direction(Dd::sum(from, degrees)),
+            degrees,
+            from,
+        })
     }
 
     /// The angle turned, in degrees.
@@ -89,7 +94,11 @@ impl Wedge {
     }
 
     fn combine(&self, left_of_start: bool, right_of_end: bool) -> bool {
-        if self.is_reflex() { left_of_start || right_of_end } else { left_of_start && right_of_end }
+        if self.is_reflex() {
+            left_of_start || right_of_end
+        } else {
+            left_of_start && right_of_end
+        }
     }
 
     /// Whether the closed wedge holds a point known to within `error`; `None` where that does not
@@ -114,6 +123,9 @@ impl Wedge {
     pub(crate) fn contains_exact(&self, p: [Dd; 2]) -> bool {
         let cross = |a: [Dd; 2], b: [Dd; 2]| a[0] * b[1] - a[1] * b[0];
         let not_negative = |v: Dd| v.f64() >= -ON_BOUNDARY;
-        self.combine(not_negative(cross(self.start, p)), not_negative(cross(p, self.end)))
+        self.combine(
+            not_negative(cross(self.start, p)),
+            not_negative(cross(p, self.end)),
+        )
     }
 }
