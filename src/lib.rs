@@ -1,4 +1,42 @@
 //! Exact voxel grids and signed distances of solids of revolution given by NURBS profiles.
+//!
+//! ```no_run
+//! let scene = voxlathe::Scene::load("scenes/torus.toml")?;
+//! let grid = scene.grid()?;
+//! let sdf = voxlathe::sample::signed_distance(&scene, &grid)?; // Volume<f32>
+//! voxlathe::io::exr::write_stack("out", &grid, &[("sdf", &sdf)])?;
+//! # Ok::<(), voxlathe::Error>(())
+//! ```
+//!
+//! # Tour
+//!
+//! Scene text becomes solids, solids meet a grid layer by layer, layers become files.
+//!
+//! ```text
+//!   scene ──> region ──> solid ──> sample ──> io          cli drives them all
+//!               │          │         │
+//!             nurbs        │        grid
+//!               └── math ──┘
+//! ```
+//!
+//! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
+//! * [`nurbs`]: knot vectors, basis functions and their cache, curves, refinement, Bézier pieces.
+//! * [`region`]: a profile's curves as bi-monotone rational pieces; membership by crossings,
+//!   certified closest points, the boundary of the filled region, line integrals.
+//! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, row spans, volume
+//!   fractions of voxels.
+//! * [`grid`]: where the voxels are; it knows no geometry.
+//! * [`sample`]: layers of occupancy, fraction, distance and material.
+//! * [`io`]: the EXR stack with its manifest, tables of points; it knows no geometry.
+//! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
+//!
+//! # What is exact, and how
+//!
+//! The solid is that of the f64 numbers in the scene. Every decision of membership is made in f64
+//! with a bound on the rounding and, where the bound does not decide, in double-double; no
+//! tolerance takes part beyond the one that calls a point at 2^-88 of the profile on its boundary.
+//! Distances are minima over all stationary points of rational pieces, isolated by the signs of
+//! Bernstein coefficients. Fractions are integrals of closed-form areas. Nothing is sampled.
 
 #[cfg(feature = "cli")]
 pub mod cli;

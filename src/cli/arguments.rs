@@ -213,7 +213,7 @@ fn parse_size(text: &str) -> Result<u64, String> {
         _ => return Err(wanted()),
     };
     let bytes = number * factor;
-    if !(bytes >= 1.0 && bytes < 9e18) {
+    if !(1.0..9e18).contains(&bytes) {
         return Err(wanted());
     }
     #[allow(

@@ -31,7 +31,7 @@ const KRONROD: [f64; 8] = [
 const GAUSS: [f64; 4] = [
     0.129_484_966_168_869_7,
     0.279_705_391_489_276_64,
-    0.381_830_050_505_118_93,
+    0.381_830_050_505_118_9,
     0.417_959_183_673_469_4,
 ];
 
@@ -120,7 +120,8 @@ mod tests {
 
     #[test]
     fn the_estimate_covers_the_true_error() {
-        let cases: [(&str, fn(f64) -> f64, f64); 3] = [
+        type Case = (&'static str, fn(f64) -> f64, f64);
+        let cases: [Case; 3] = [
             (
                 "quarter circle",
                 |x| (1.0 - x * x).sqrt(),

@@ -434,7 +434,7 @@ mod tests {
     #[test]
     fn interpolating_curves_pass_through_their_points() {
         let points: Vec<[f64; 2]> = (0..23)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|t| [2.0 + (0.7 * t).sin(), t * 0.3 + (t * 1.9).cos() * 0.2])
             .collect();
         for degree in 1..=7 {
