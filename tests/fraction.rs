@@ -27,7 +27,11 @@ fn cell(scene: &Scene, min: [f64; 3], max: [f64; 3]) -> f64 {
 
 /// Cells of the unit ball whose fractions are known.
 const CELLS: [([f64; 3], [f64; 3], f64); 3] = [
-    ([0.0, 0.0, 0.0], [1.0, 1.0, 1.0], std::f64::consts::FRAC_PI_6),
+    (
+        [0.0, 0.0, 0.0],
+        [1.0, 1.0, 1.0],
+        std::f64::consts::FRAC_PI_6,
+    ),
     ([0.5, 0.5, 0.0], [1.0, 1.0, 0.5], 0.235_929_877_714),
     ([0.5, 0.5, 0.5], [0.75, 0.75, 0.75], 0.121_643_916_231),
 ];
@@ -36,12 +40,22 @@ const CELLS: [([f64; 3], [f64; 3], f64); 3] = [
 fn cells_of_the_ball_in_every_orientation_of_its_axis() {
     // A ball is the same about any axis, but the cell's cross-sections are not: the upright,
     // lying and oblique paths must agree with the closed form.
-    for direction in ["[0, 0, 1]", "[1, 0, 0]", "[0, -1, 0]", "[1, 1, 0]", "[1, 2, 3]", "[0.001, 0, 1]"] {
+    for direction in [
+        "[0, 0, 1]",
+        "[1, 0, 0]",
+        "[0, -1, 0]",
+        "[1, 1, 0]",
+        "[1, 2, 3]",
+        "[0.001, 0, 1]",
+    ] {
         let scene = ball(&format!("axis = {{ direction = {direction} }}"));
         for (min, max, want) in CELLS {
             // The table is of the fraction of the cell; the first cell's is π/6.
             let found = cell(&scene, min, max);
-            assert!((found - want).abs() < 3e-8, "axis {direction}, cell {min:?}: {found} for {want}");
+            assert!(
+                (found - want).abs() < 3e-8,
+                "axis {direction}, cell {min:?}: {found} for {want}"
+            );
         }
     }
 }
@@ -50,11 +64,18 @@ fn cells_of_the_ball_in_every_orientation_of_its_axis() {
 fn wedges_share_out_the_whole() {
     for direction in ["[0, 0, 1]", "[0, 1, 0]", "[1, 2, 3]"] {
         for split in [10.0, 90.0, 180.0, 200.0, 359.0] {
-            let wedge = |start: f64, angle: f64| ball(&format!("axis = {{ direction = {direction} }}\nstart = {start}\nangle = {angle}"));
+            let wedge = |start: f64, angle: f64| {
+                ball(&format!(
+                    "axis = {{ direction = {direction} }}\nstart = {start}\nangle = {angle}"
+                ))
+            };
             let (a, b) = (wedge(25.0, split), wedge(25.0 + split, 360.0 - split));
             for (min, max, want) in CELLS {
                 let sum = cell(&a, min, max) + cell(&b, min, max);
-                assert!((sum - want).abs() < 1e-7, "{direction}, {split}: {sum} for {want}");
+                assert!(
+                    (sum - want).abs() < 1e-7,
+                    "{direction}, {split}: {sum} for {want}"
+                );
             }
         }
     }
@@ -62,30 +83,64 @@ fn wedges_share_out_the_whole() {
 
 #[test]
 fn fractions_sum_to_the_exact_volume() {
-    for name in ["torus", "cylinder", "sphere", "cone", "goblet", "nozzle", "vase", "half_torus", "rings"] {
-        let scene = Scene::load_with(format!("scenes/{name}.toml"), &["grid.resolution=31".to_owned()]).expect("a scene");
+    for name in [
+        "torus",
+        "cylinder",
+        "sphere",
+        "cone",
+        "goblet",
+        "nozzle",
+        "vase",
+        "half_torus",
+        "rings",
+    ] {
+        let scene = Scene::load_with(
+            format!("scenes/{name}.toml"),
+            &["grid.resolution=31".to_owned()],
+        )
+        .expect("a scene");
         let grid = scene.grid().expect("a grid");
         let fractions = sample::fraction(&scene, &grid).expect("small");
-        let sum: f64 = fractions.data().iter().map(|&f| f64::from(f)).sum::<f64>() * grid.voxel_volume();
+        let sum: f64 =
+            fractions.data().iter().map(|&f| f64::from(f)).sum::<f64>() * grid.voxel_volume();
         let exact = scene.exact_volume().expect("one body");
-        eprintln!("{name}: {sum} of {exact}, relative {:.1e}", (sum - exact).abs() / exact);
-        assert!((sum - exact).abs() < 2e-8 * exact, "{name}: {sum} for {exact}");
-        assert!(fractions.data().iter().all(|f| (0.0..=1.0).contains(f)), "{name}");
+        eprintln!(
+            "{name}: {sum} of {exact}, relative {:.1e}",
+            (sum - exact).abs() / exact
+        );
+        assert!(
+            (sum - exact).abs() < 2e-8 * exact,
+            "{name}: {sum} for {exact}"
+        );
+        assert!(
+            fractions.data().iter().all(|f| (0.0..=1.0).contains(f)),
+            "{name}"
+        );
     }
 }
 
 #[test]
 fn clear_voxels_are_exact() {
     for name in ["goblet", "vase", "cone", "overlap"] {
-        let scene = Scene::load_with(format!("scenes/{name}.toml"), &["grid.resolution=17".to_owned()]).expect("a scene");
+        let scene = Scene::load_with(
+            format!("scenes/{name}.toml"),
+            &["grid.resolution=17".to_owned()],
+        )
+        .expect("a scene");
         let grid = scene.grid().expect("a grid");
         let fractions = sample::fraction(&scene, &grid).expect("small");
         let [nx, ny, nz] = grid.dims();
-        for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
+        for (k, j, i) in
+            (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i))))
+        {
             let d = scene.assembly().signed_distance(grid.centre(i, j, k));
             if d.abs() >= 0.5 * grid.spacing().length() * (1.0 + 1e-8) {
                 let want = if d < 0.0 { 1.0 } else { 0.0 };
-                assert!((fractions.get(i, j, k) - want).abs() == 0.0, "{name}: ({i}, {j}, {k}) is {}", fractions.get(i, j, k));
+                assert!(
+                    (fractions.get(i, j, k) - want).abs() == 0.0,
+                    "{name}: ({i}, {j}, {k}) is {}",
+                    fractions.get(i, j, k)
+                );
             }
         }
     }
@@ -107,15 +162,24 @@ fn overlapping_balls_fill_their_union() {
         place = [{ rotate = { axis = [1, 0.3, 0], degrees = 70 } }, { translate = [0.9, 0.2, 0.1] }]"#,
     )
     .expect("two balls");
-    let grid = GridSpec::new([13, 11, 11], DVec3::splat(-1.1), DVec3::new(3.2, 2.4, 2.3) / DVec3::new(13.0, 11.0, 11.0)).expect("a grid");
+    let grid = GridSpec::new(
+        [13, 11, 11],
+        DVec3::splat(-1.1),
+        DVec3::new(3.2, 2.4, 2.3) / DVec3::new(13.0, 11.0, 11.0),
+    )
+    .expect("a grid");
     let fractions = sample::fraction(&scene, &grid).expect("small");
-    let sum: f64 = fractions.data().iter().map(|&f| f64::from(f)).sum::<f64>() * grid.voxel_volume();
+    let sum: f64 =
+        fractions.data().iter().map(|&f| f64::from(f)).sum::<f64>() * grid.voxel_volume();
     let d = DVec3::new(0.9, 0.2, 0.1).length();
     let lens = std::f64::consts::PI * (4.0 + d) * (2.0 - d).powi(2) / 12.0;
     let want = 8.0 / 3.0 * std::f64::consts::PI - lens;
     eprintln!("union of two balls: {sum} for {want}");
     // Each voxel is within 1e-6; that many touch both surfaces at most.
-    assert!((sum - want).abs() < 1e-6 * 200.0 * grid.voxel_volume(), "{sum} for {want}");
+    assert!(
+        (sum - want).abs() < 1e-6 * 200.0 * grid.voxel_volume(),
+        "{sum} for {want}"
+    );
 }
 
 #[test]
@@ -125,21 +189,36 @@ fn coaxial_parts_that_touch_leave_no_gap() {
     let text = |curves: &[&str]| {
         let mut t = String::from("schema = 1\n");
         for (i, c) in curves.iter().enumerate() {
-            t += &format!("[profiles.p{i}]\nboundary = \"to-axis\"\ncurves = [{{ kind = \"polyline\", points = {c} }}]\n");
+            t += &format!(
+                "[profiles.p{i}]\nboundary = \"to-axis\"\ncurves = [{{ kind = \"polyline\", points = {c} }}]\n"
+            );
         }
         for i in 0..curves.len() {
-            t += &format!("[[solid]]\nkind = \"revolve\"\nprofile = \"p{i}\"\naxis = {{ direction = [1, 2, 3] }}\n");
+            t += &format!(
+                "[[solid]]\nkind = \"revolve\"\nprofile = \"p{i}\"\naxis = {{ direction = [1, 2, 3] }}\n"
+            );
         }
         Scene::parse(&t).expect("a scene")
     };
     let whole = text(&["[[1, 0], [1, 2]]"]);
     let halves = text(&["[[1, 0], [1, 0.77]]", "[[1, 0.77], [1, 2]]"]);
-    let grid = GridSpec::new([17, 13, 11], DVec3::new(-1.2, -1.2, -1.0), DVec3::splat(0.25)).expect("a grid");
-    let (a, b) = (sample::fraction(&whole, &grid).expect("small"), sample::fraction(&halves, &grid).expect("small"));
+    let grid = GridSpec::new(
+        [17, 13, 11],
+        DVec3::new(-1.2, -1.2, -1.0),
+        DVec3::splat(0.25),
+    )
+    .expect("a grid");
+    let (a, b) = (
+        sample::fraction(&whole, &grid).expect("small"),
+        sample::fraction(&halves, &grid).expect("small"),
+    );
     for (x, y) in a.data().iter().zip(b.data()) {
         assert!((x - y).abs() < 1e-7, "{x} and {y}");
     }
-    let (a, b) = (sample::signed_distance(&whole, &grid).expect("small"), sample::signed_distance(&halves, &grid).expect("small"));
+    let (a, b) = (
+        sample::signed_distance(&whole, &grid).expect("small"),
+        sample::signed_distance(&halves, &grid).expect("small"),
+    );
     for (x, y) in a.data().iter().zip(b.data()) {
         assert!((x - y).abs() <= 2.0 * f32::EPSILON * x.abs(), "{x} and {y}");
     }

@@ -14,7 +14,12 @@ fn scenes() -> Vec<(String, Scene)> {
     paths.sort();
     paths
         .into_iter()
-        .map(|p| (p.display().to_string(), Scene::load(&p).expect("a shipped scene loads")))
+        .map(|p| {
+            (
+                p.display().to_string(),
+                Scene::load(&p).expect("a shipped scene loads"),
+            )
+        })
         .collect()
 }
 
@@ -44,12 +49,22 @@ fn spans_equal_point_tests() {
             let material = sample::material(&scene, &grid).expect("small");
             let [nx, ny, nz] = grid.dims();
             let mut inside = 0;
-            for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
+            for (k, j, i) in
+                (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i))))
+            {
                 let p = grid.centre(i, j, k);
                 let want = scene.assembly().contains(p);
                 inside += u32::from(want);
-                assert_eq!(*occupancy.get(i, j, k) != 0, want, "{name}: voxel ({i}, {j}, {k}) at {p}");
-                assert_eq!(*material.get(i, j, k), scene.assembly().material(p), "{name}: material at {p}");
+                assert_eq!(
+                    *occupancy.get(i, j, k) != 0,
+                    want,
+                    "{name}: voxel ({i}, {j}, {k}) at {p}"
+                );
+                assert_eq!(
+                    *material.get(i, j, k),
+                    scene.assembly().material(p),
+                    "{name}: material at {p}"
+                );
             }
             assert!(inside > 0, "{name}: nothing inside {grid:?}");
         }
@@ -62,11 +77,16 @@ fn rows_of_distances_equal_points() {
         for grid in grids(&scene) {
             let sdf = sample::signed_distance(&scene, &grid).expect("small");
             let [nx, ny, nz] = grid.dims();
-            for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
+            for (k, j, i) in
+                (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i))))
+            {
                 let p = grid.centre(i, j, k);
                 let (found, want) = (*sdf.get(i, j, k), scene.assembly().signed_distance(p));
                 let ulp = f64::from(f32::EPSILON) * want.abs();
-                assert!((f64::from(found) - want).abs() <= ulp, "{name}: {found} for {want} at {p}");
+                assert!(
+                    (f64::from(found) - want).abs() <= ulp,
+                    "{name}: {found} for {want} at {p}"
+                );
                 assert_eq!(found <= 0.0, want <= 0.0, "{name}: sign at {p}");
             }
         }

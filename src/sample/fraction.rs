@@ -11,12 +11,12 @@
 //! and the voxel is divided until the bounds sum to less than 2e-6.
 
 use crate::grid::GridSpec;
-use crate::solid::{Assembly, CellShape};
+use crate::solid::{Assembly, CellShape, TOLERANCE};
 use glam::DVec3;
 use std::collections::BinaryHeap;
 
 /// Width of the bounds at which a divided voxel is done.
-const WIDTH: f64 = 1e-6;
+const WIDTH: f64 = 2e-6;
 /// Most cells a voxel is divided into.
 const CELLS: usize = 6_000;
 
@@ -90,7 +90,7 @@ impl FractionSampler {
             let share = match touched.as_slice() {
                 _ if full => 1.0,
                 [] => 0.0,
-                [b] => bodies[*b].fraction(&self.shapes[*b], centre),
+                [b] => bodies[*b].fraction(&self.shapes[*b], centre, TOLERANCE),
                 several => union_share(assembly, several, centre, self.sides),
             };
             sum += share;
@@ -147,7 +147,7 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
     let mut heap = BinaryHeap::new();
     let mut gap = 0.0;
     for (centre, sides) in flat_faces_apart(assembly, bodies, centre, sides) {
-        let cell = bounded(assembly, bodies, centre, sides);
+        let cell = bounded(assembly, bodies, centre, sides, whole);
         gap += cell.gap();
         heap.push(cell);
     }
@@ -162,6 +162,7 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
                 bodies,
                 cell.centre + half * DVec3::new(side(0), side(1), side(2)),
                 half,
+                whole,
             );
             gap += part.gap();
             heap.push(part);
@@ -178,7 +179,7 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
     (cells.iter().map(|c| 0.5 * (c.low + c.high)).sum::<f64>() / whole).clamp(0.0, 1.0)
 }
 
-fn bounded(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3) -> Cell {
+fn bounded(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3, whole: f64) -> Cell {
     let volume = sides.element_product();
     let (mut low, mut high) = (0.0_f64, 0.0_f64);
     for &b in bodies {
@@ -190,7 +191,9 @@ fn bounded(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3) -
         let share = if body.distance(centre, inside, reach(sides)) >= reach(sides) {
             f64::from(u8::from(inside))
         } else {
-            body.fraction(&CellShape::new(body.frame(), sides), centre)
+            // A small part of the voxel need not be known better than the voxel.
+            let tolerance = (TOLERANCE * whole / volume).min(1e-4);
+            body.fraction(&CellShape::new(body.frame(), sides), centre, tolerance)
         };
         low = low.max(share);
         high += share;

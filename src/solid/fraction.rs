@@ -12,7 +12,10 @@
 //! polygon changes its edges and, for a polygon that does not change with z, at the radii where
 //! the circle meets its corners or touches its edges. In between the integrand is smooth but for
 //! (r - r₀)^{3/2} at the cuts, which the substitution t = 3u² - 2u³ makes smooth. Gauss-Kronrod
-//! panels are halved until the error estimate is below 1e-10 of the voxel.
+//! panels are halved until the error estimate is below what the caller asks.
+//!
+//! For a polygon that changes with z the meetings with its corners are sought too, but cuts only
+//! save work: what they leave is found by the halving.
 
 use super::body::Body;
 use super::turn::Turn;
@@ -25,8 +28,9 @@ use smallvec::SmallVec;
 
 /// Share of the voxel below which a sum of areas is taken as nothing, or as everything: rounding.
 const SNAP: f64 = 1e-11;
-/// Estimated error of one panel sequence, as a share of the voxel.
-const TOLERANCE: f64 = 1e-10;
+/// Estimated error of one stretch of a piece, as a share of the voxel: a hundredth of what is
+/// promised, for the few stretches a voxel meets.
+pub(crate) const TOLERANCE: f64 = 1e-8;
 
 /// The cross-sections of a voxel, normal to a solid's axis. All voxels of a grid share it.
 #[derive(Debug, Clone)]
@@ -123,11 +127,20 @@ fn on_edge(corners: &[DVec3; 8], [i, j]: [usize; 2], z: f64) -> DVec2 {
 /// Convex parts of a cross-section within the turn, with their signs.
 type Sections = SmallVec<[(Polygon, f64); 2]>;
 
-fn within_turn(polygon: Polygon, turn: &Turn) -> Sections {
+/// How a voxel lies to the turn.
+#[derive(Clone, Copy, PartialEq)]
+enum Reach {
+    /// The turn takes the whole voxel.
+    Whole,
+    /// A cap's plane passes through it.
+    Cut,
+}
+
+/// The part of a cross-section within the turn.
+fn within_turn(polygon: Polygon, turn: &Turn, reach: Reach) -> Sections {
     let mut sections = Sections::new();
     match turn {
-        Turn::Full => sections.push((polygon, 1.0)),
-        Turn::Partial(wedge) => {
+        Turn::Partial(wedge) if reach == Reach::Cut => {
             let [s, e] = wedge.directions();
             if wedge.is_reflex() {
                 // Everything less the convex rest.
@@ -138,6 +151,7 @@ fn within_turn(polygon: Polygon, turn: &Turn) -> Sections {
                 sections.push((disc::clip_left(&disc::clip_left(&polygon, s), -e), 1.0));
             }
         }
+        _ => sections.push((polygon, 1.0)),
     }
     sections
 }
@@ -149,15 +163,50 @@ fn disc_area(sections: &Sections, r: f64) -> f64 {
         .sum()
 }
 
+/// One voxel in a solid's frame.
+struct Cell<'a> {
+    shape: &'a CellShape,
+    /// Centre, across the axis and along it.
+    flat: DVec2,
+    z: f64,
+    turn: &'a Turn,
+    reach: Reach,
+    /// Error allowed to one stretch of a piece, in local volume.
+    tolerance: f64,
+}
+
 impl Body {
-    /// The share of the voxel centred on `centre` that the solid fills, between 0 and 1.
-    pub(crate) fn fraction(&self, shape: &CellShape, centre: DVec3) -> f64 {
+    /// The share of the voxel centred on `centre` that the solid fills, between 0 and 1, each
+    /// stretch of the profile within an estimated error of `tolerance`.
+    pub(crate) fn fraction(&self, shape: &CellShape, centre: DVec3, tolerance: f64) -> f64 {
         let c = self.frame().to_local(centre).point;
         let flat = DVec2::new(c.x, c.y);
-        let mut volume = 0.0;
-        for slab in 0..shape.slabs.len() {
-            volume += self.slab_volume(shape, slab, flat, c.z);
+        let mut reach = Reach::Whole;
+        if let Turn::Partial(wedge) = self.turn() {
+            let half = shape.half_diagonal();
+            if wedge
+                .directions()
+                .iter()
+                .all(|d| d.perp_dot(flat).abs() > half)
+            {
+                if wedge.contains(flat, 0.0) == Some(false) {
+                    return 0.0;
+                }
+            } else {
+                reach = Reach::Cut;
+            }
         }
+        let cell = Cell {
+            shape,
+            flat,
+            z: c.z,
+            turn: self.turn(),
+            reach,
+            tolerance: tolerance * shape.volume,
+        };
+        let volume: f64 = (0..shape.slabs.len())
+            .map(|slab| self.slab_volume(&cell, slab))
+            .sum();
         let share = volume / shape.volume;
         if share < SNAP {
             0.0
@@ -168,14 +217,18 @@ impl Body {
         }
     }
 
-    fn slab_volume(&self, shape: &CellShape, slab: usize, flat: DVec2, z: f64) -> f64 {
+    fn slab_volume(&self, cell: &Cell, slab: usize) -> f64 {
+        let (shape, z) = (cell.shape, cell.z);
         let (bottom, top) = (shape.heights[slab], shape.heights[slab + 1]);
-        let sections_at =
-            |h: f64| within_turn(shape.polygon(slab, h.clamp(bottom, top), flat), self.turn());
-        let fixed = shape.upright.then(|| sections_at(0.5 * (bottom + top)));
-        let reach = shape.half_diagonal();
-        let (near, far) = ((flat.length() - reach).max(0.0), flat.length() + reach);
-        let breaks = fixed.as_ref().map(critical_radii);
+        let fixed = shape
+            .upright
+            .then(|| cell.sections(slab, z + 0.5 * (bottom + top)));
+        let half = shape.half_diagonal();
+        let (near, far) = (
+            (cell.flat.length() - half).max(0.0),
+            cell.flat.length() + half,
+        );
+        let radii = fixed.as_ref().map(critical_radii);
         let mut volume = 0.0;
         self.boundary_near(z + bottom, z + top, near, |part| {
             let piece = &part.piece;
@@ -183,38 +236,44 @@ impl Body {
             if sign == 0.0 || piece.on_axis {
                 return;
             }
-            let (low, high) = (
-                piece.bounds.min[1].max(z + bottom),
-                piece.bounds.max[1].min(z + top),
-            );
+            let low = piece.bounds.min[1].max(z + bottom);
+            let high = piece.bounds.max[1].min(z + top);
             if low >= high {
                 return;
             }
+            // Beyond the voxel the disc takes the whole polygon.
             let beyond = piece.bounds.min[0] >= far;
-            if let (Some(sections), true) = (&fixed, beyond) {
-                volume += sign * (high - low) * disc_area(sections, far * 2.0);
-                return;
-            }
             let area = |r: f64, height: f64| match &fixed {
                 Some(sections) => disc_area(sections, r),
-                None => disc_area(&sections_at(height - z), r),
+                None => disc_area(&cell.sections(slab, height), r),
             };
-            if beyond {
-                // The polygon's area is quadratic in z: one panel is exact.
-                volume += sign * quadrature::panel(&mut |h| area(far * 2.0, h), low, high).value;
-            } else {
-                volume += sign
-                    * piece_volume(
-                        part,
-                        low,
-                        high,
-                        breaks.as_deref(),
-                        TOLERANCE * shape.volume,
-                        &area,
-                    );
-            }
+            volume += sign
+                * match (beyond, &radii) {
+                    (true, Some(_)) => (high - low) * area(2.0 * far, low),
+                    // The polygon's area is quadratic in z: one panel is exact.
+                    (true, None) => quadrature::panel(&mut |h| area(2.0 * far, h), low, high).value,
+                    (false, Some(radii)) => {
+                        let stretch = Stretch::new(part, low, high);
+                        stretch.volume(&stretch.at_radii(radii), cell.tolerance, &area)
+                    }
+                    (false, None) => {
+                        let stretch = Stretch::new(part, low, high);
+                        stretch.volume(&stretch.at_corners(cell, slab), cell.tolerance, &area)
+                    }
+                };
         });
         volume
+    }
+}
+
+impl Cell<'_> {
+    /// The cross-section at height `h`, within the turn.
+    fn sections(&self, slab: usize, h: f64) -> Sections {
+        within_turn(
+            self.shape.polygon(slab, h - self.z, self.flat),
+            self.turn,
+            self.reach,
+        )
     }
 }
 
@@ -234,115 +293,150 @@ fn critical_radii(sections: &Sections) -> Vec<f64> {
     radii
 }
 
-/// ∫ area(r(z), z) |dz| along the part of a piece between two heights.
-fn piece_volume(
-    part: &BoundaryPiece,
-    low: f64,
-    high: f64,
-    breaks: Option<&[f64]>,
-    tolerance: f64,
-    area: &impl Fn(f64, f64) -> f64,
-) -> f64 {
-    let piece = &part.piece;
-    let rising = piece.direction() > 0;
-    let at_height = |h: f64| parameter(part, 1, h);
-    let (a, b) = if rising {
-        (at_height(low), at_height(high))
-    } else {
-        (at_height(high), at_height(low))
-    };
-    let mut cuts: SmallVec<[f64; 16]> = SmallVec::new();
-    cuts.push(a);
-    if let Some(radii) = breaks {
-        let origin = piece.twin.origin[0];
-        let (ra, rb) = (piece.twin.at(a)[0] + origin, piece.twin.at(b)[0] + origin);
-        let inner = radii.iter().filter(|&&r| r > ra.min(rb) && r < ra.max(rb));
-        cuts.extend(
-            inner
-                .map(|&r| parameter(part, 0, r))
-                .filter(|&t| t > a && t < b),
-        );
-        cuts.sort_by(f64::total_cmp);
-    }
-    cuts.push(b);
-    let [r, z, w] = &piece.twin.coefficients;
-    let origin = piece.twin.origin;
-    let linear = piece.degree() == 1;
-    let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
-    let integrand = |t: f64| {
-        if linear {
-            let dz = end[1] - start[1];
-            return area(start[0] + (end[0] - start[0]) * t, start[1] + dz * t) * dz.abs();
-        }
-        let (r, _) = bernstein::evaluate_with_derivative(r, t);
-        let (z, dz) = bernstein::evaluate_with_derivative(z, t);
-        let (w, dw) = bernstein::evaluate_with_derivative(w, t);
-        area(r / w + origin[0], z / w + origin[1]) * ((dz * w - z * dw) / (w * w)).abs()
-    };
-    cuts.windows(2)
-        .filter(|c| c[1] > c[0])
-        .map(|c| {
-            let width = c[1] - c[0];
-            let smooth = |u: f64| {
-                integrand(c[0] + width * u * u * (3.0 - 2.0 * u)) * width * 6.0 * u * (1.0 - u)
-            };
-            quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256).value
-        })
-        .sum()
+/// The part of a piece between two heights.
+struct Stretch<'a> {
+    part: &'a BoundaryPiece,
+    from: f64,
+    to: f64,
 }
 
-/// The parameter at which coordinate `c` of a piece takes the value `v`, by bisection and secant;
-/// clamped to the piece.
+type Cuts = SmallVec<[f64; 16]>;
+
+impl<'a> Stretch<'a> {
+    fn new(part: &'a BoundaryPiece, low: f64, high: f64) -> Self {
+        let (a, b) = (parameter(part, 1, low), parameter(part, 1, high));
+        let (from, to) = if part.piece.direction() > 0 {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        Self { part, from, to }
+    }
+
+    /// The radius and height at a parameter.
+    fn point(&self, t: f64) -> [f64; 2] {
+        let piece = &self.part.piece;
+        let p = piece.twin.at(t);
+        [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]]
+    }
+
+    /// Parameters at which the radius takes one of the values.
+    fn at_radii(&self, radii: &[f64]) -> Cuts {
+        let (a, b) = (self.point(self.from)[0], self.point(self.to)[0]);
+        let inner = radii.iter().filter(|&&r| r > a.min(b) && r < a.max(b));
+        inner.map(|&r| parameter(self.part, 0, r)).collect()
+    }
+
+    /// Parameters at which the circle passes through a corner of the cross-section, as far as the
+    /// difference changes sign between the ends and the middle.
+    fn at_corners(&self, cell: &Cell, slab: usize) -> Cuts {
+        let mut cuts = Cuts::new();
+        for &edge in &cell.shape.slabs[slab] {
+            let off = |t: f64| {
+                let [r, h] = self.point(t);
+                (on_edge(&cell.shape.corners, edge, h - cell.z) + cell.flat).length() - r
+            };
+            let middle = 0.5 * (self.from + self.to);
+            let (a, m, b) = (off(self.from), off(middle), off(self.to));
+            for (s, t, low, high) in [(self.from, middle, a, m), (middle, self.to, m, b)] {
+                if low * high < 0.0 {
+                    cuts.push(illinois(&off, s, t, low, high));
+                }
+            }
+        }
+        cuts
+    }
+
+    /// ∫ area(r(z), z) |dz|, cut at the given parameters.
+    fn volume(&self, cuts: &[f64], tolerance: f64, area: &impl Fn(f64, f64) -> f64) -> f64 {
+        let piece = &self.part.piece;
+        let mut ends: Cuts = cuts
+            .iter()
+            .copied()
+            .filter(|&t| t > self.from && t < self.to)
+            .collect();
+        ends.push(self.from);
+        ends.push(self.to);
+        ends.sort_by(f64::total_cmp);
+        let [r, z, w] = &piece.twin.coefficients;
+        let origin = piece.twin.origin;
+        let linear = piece.degree() == 1;
+        let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
+        let integrand = |t: f64| {
+            if linear {
+                let dz = end[1] - start[1];
+                return area(start[0] + (end[0] - start[0]) * t, start[1] + dz * t) * dz.abs();
+            }
+            let (r, _) = bernstein::evaluate_with_derivative(r, t);
+            let (z, dz) = bernstein::evaluate_with_derivative(z, t);
+            let (w, dw) = bernstein::evaluate_with_derivative(w, t);
+            area(r / w + origin[0], z / w + origin[1]) * ((dz * w - z * dw) / (w * w)).abs()
+        };
+        ends.windows(2)
+            .filter(|c| c[1] > c[0])
+            .map(|c| {
+                let width = c[1] - c[0];
+                let smooth = |u: f64| {
+                    integrand(c[0] + width * u * u * (3.0 - 2.0 * u)) * width * 6.0 * u * (1.0 - u)
+                };
+                quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256).value
+            })
+            .sum()
+    }
+}
+
+/// The parameter at which coordinate `c` of a piece takes the value `v`, clamped to the piece.
 fn parameter(part: &BoundaryPiece, c: usize, v: f64) -> f64 {
     let piece = &part.piece;
     let (start, end) = (piece.start[c].f64(), piece.end[c].f64());
     let rising = end > start;
-    if (v <= start) == rising {
+    if v == start || (v < start) == rising {
         return 0.0;
     }
-    if (v >= end) == rising {
+    if v == end || (v > end) == rising {
         return 1.0;
     }
     if piece.degree() == 1 {
         return (v - start) / (end - start);
     }
     let target = v - piece.twin.origin[c];
-    let value = |t: f64| {
-        if rising {
-            piece.twin.at(t)[c] - target
-        } else {
-            target - piece.twin.at(t)[c]
-        }
-    };
-    let (mut lo, mut hi) = (0.0_f64, 1.0_f64);
-    let (mut f_lo, mut f_hi) = (value(0.0).min(0.0), value(1.0).max(0.0));
-    let close = 4.0 * f64::EPSILON * (f_hi - f_lo);
-    // Illinois' rule: a secant that halves the value of the end it keeps.
+    let off = |t: f64| piece.twin.at(t)[c] - target;
+    illinois(&off, 0.0, 1.0, off(0.0), off(1.0))
+}
+
+/// The root of `f` between `a` and `b`: the secant, halving the value at the end it keeps. Where the
+/// values at the ends do not differ in sign, the root is within rounding of the end nearer to it.
+fn illinois(f: &impl Fn(f64) -> f64, a: f64, b: f64, f_a: f64, f_b: f64) -> f64 {
+    let (mut lo, mut hi, mut f_lo, mut f_hi) = (a, b, f_a, f_b);
+    if (f_lo < 0.0) == (f_hi < 0.0) {
+        return if f_lo.abs() < f_hi.abs() { a } else { b };
+    }
+    let close = 4.0 * f64::EPSILON * (f_hi - f_lo).abs();
     let mut side = 0;
     for _ in 0..100 {
-        let m = if f_hi > f_lo {
-            lo - f_lo * (hi - lo) / (f_hi - f_lo)
+        let secant = lo - f_lo * (hi - lo) / (f_hi - f_lo);
+        let m = if secant > lo && secant < hi {
+            secant
         } else {
             0.5 * (lo + hi)
         };
-        let m = if m > lo && m < hi { m } else { 0.5 * (lo + hi) };
         if !(m > lo && m < hi) || hi - lo <= 1e-15 {
             break;
         }
-        let f = value(m);
-        if f.abs() <= close {
+        let v = f(m);
+        if v.abs() <= close {
             return m;
         }
-        if f < 0.0 {
+        if (v < 0.0) == (f_lo < 0.0) {
             if side == -1 {
                 f_hi *= 0.5;
             }
-            (lo, f_lo, side) = (m, f, -1);
+            (lo, f_lo, side) = (m, v, -1);
         } else {
             if side == 1 {
                 f_lo *= 0.5;
             }
-            (hi, f_hi, side) = (m, f, 1);
+            (hi, f_hi, side) = (m, v, 1);
         }
     }
     0.5 * (lo + hi)

@@ -15,5 +15,5 @@ pub use assembly::{Assembly, Part};
 pub use body::Body;
 pub use turn::Turn;
 
-pub(crate) use fraction::CellShape;
+pub(crate) use fraction::{CellShape, TOLERANCE};
 pub(crate) use row::{Cuts, LayerCuts, Row};
