@@ -52,3 +52,8 @@ pub mod solid;
 
 pub use error::Error;
 pub use scene::Scene;
+
+/// The README's examples compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

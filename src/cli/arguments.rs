@@ -27,23 +27,23 @@ pub(super) struct Arguments {
 #[derive(Debug, Args)]
 pub(super) struct Common {
     /// Threads to use; all cores without it. The results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, help_heading = "Common options", value_name = "N")]
     pub(super) threads: Option<NonZeroUsize>,
     /// Say nothing but errors
-    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    #[arg(long, short, global = true, help_heading = "Common options", conflicts_with = "verbose")]
     pub(super) quiet: bool,
     /// Say what is being done, on standard error
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = "Common options")]
     pub(super) verbose: bool,
     /// When to colour what people read
-    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t = Color::Auto)]
+    #[arg(long, global = true, help_heading = "Common options", value_name = "WHEN", value_enum, default_value_t = Color::Auto)]
     pub(super) color: Color,
     /// Change a key of the scene, may be repeated: a dotted path with array indices from 0, and a
     /// value as TOML, else as a string (grid.resolution=64, solid.0.angle=270, units=mm)
-    #[arg(long, global = true, value_name = "PATH=VALUE")]
+    #[arg(long, global = true, help_heading = "Common options", value_name = "PATH=VALUE")]
     pub(super) set: Vec<String>,
     /// Write one JSON document to standard output, and nothing else there
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Common options")]
     pub(super) json: bool,
 }
 

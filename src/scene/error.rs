@@ -21,7 +21,7 @@ pub enum SceneError {
         problem: Box<InputProblem>,
     },
     /// A file could not be read.
-    #[error("cannot read {path}{}", asked_by.as_ref().map(|at| format!(", asked for by {at}")).unwrap_or_default())]
+    #[error("cannot read {path}{}; check that it exists and that you may read it", asked_by.as_ref().map(|at| format!(", asked for by {at}")).unwrap_or_default())]
     #[non_exhaustive]
     Read {
         /// The file, as given.
