@@ -88,7 +88,7 @@ pub(crate) fn texts(crossing: bool) -> Vec<(String, String)> {
         "periodic, uneven, weighted",
         "curves = [{ kind = 'nurbs', degree = 2, points = [[2, 0], [3, 0], [3.5, 1], [2, 2], [1, 1], \
          [2, 0], [3, 0]], weights = [1, 3, 0.1, 1, 20, 1, 3], \
-         knots = [0, 0.5, 0.7, 1.75, 2.5, 3.125, 4, 4.5, 4.7, 5.75] }]",
+         knots = [0, 0.5, 0.7, 1.75, 2.5, 4, 4.5, 4.7, 5.75, 6.5] }]",
         "angle = 90",
     );
     add(
@@ -98,7 +98,7 @@ pub(crate) fn texts(crossing: bool) -> Vec<(String, String)> {
          { kind = 'polyline', points = [[2, 1], [1.9, 3]] }]",
         "",
     );
-    for (name, wall) in [("1e-3", 1e-3), ("1e-9", 1e-9), ("1e-13", 1e-13)] {
+    for (name, wall) in [("1e-3", 1e-3), ("1e-9", 1e-9), ("1e-11", 1e-11)] {
         add(
             &format!("thin wall of {name}"),
             &format!(
