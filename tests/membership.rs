@@ -134,23 +134,33 @@ fn a_million_points_agree_with_the_oracle() {
 
 #[test]
 fn powers_of_two_change_no_bit() {
+    let mut failures = String::new();
     for (name, scene) in hard::shipped().into_iter().chain(hard::scenes(true)) {
-        let points = sample(&scene, 77, 300);
+        let points = sample(&scene, 77, 240);
         for power in [-20, 20] {
             let k = 2_f64.powi(power);
             let text = scene_text(scene.model(), k, "");
             let scaled = Scene::parse(&text).unwrap_or_else(|e| panic!("{name}: {e}\n{text}"));
+            let (a, b) = (scene.assembly(), scaled.assembly());
+            let mut differ = 0;
             for &p in &points {
-                let (a, b) = (scene.assembly(), scaled.assembly());
-                let membership = (a.contains(p), b.contains(p * k));
-                assert_eq!(membership.0, membership.1, "{name} x 2^{power} at {p:?}");
-                let distance = (a.signed_distance(p) * k, b.signed_distance(p * k));
-                assert_eq!(
-                    distance.0.to_bits(),
-                    distance.1.to_bits(),
-                    "{name} x 2^{power} at {p:?}: {distance:?}"
-                );
+                let inside = (a.contains(p), b.contains(p * k));
+                let distance = (a.signed_distance(p), b.signed_distance(p * k));
+                // An outside distance that rounds to 0 is the smallest positive at any scale.
+                let least = distance.0 == distance.1 && distance.0 == f64::from_bits(1);
+                let same = (distance.0 * k).to_bits() == distance.1.to_bits() || least;
+                if inside.0 != inside.1 || !same {
+                    differ += 1;
+                    if differ == 1 {
+                        failures +=
+                            &format!("{name} x 2^{power} at {p:?}: {inside:?} {distance:?}\n");
+                    }
+                }
+            }
+            if differ > 0 {
+                println!("{name} x 2^{power}: {differ} of {} differ", points.len());
             }
         }
     }
+    assert!(failures.is_empty(), "{failures}");
 }
