@@ -65,7 +65,7 @@ fn heavy_weights_near_the_end_of_a_curve() {
 }
 
 /// Two curves that leave the axis along z = 0, one below and one above: the crack between them is
-/// 7e-8 wide at r = 1e-4 and 7e-16 at 1e-8, where it was taken as closed.
+/// 4e-8 wide at r = 1e-4 and 4e-16 at 1e-8, where it was taken as closed.
 #[test]
 fn a_crack_that_closes_at_the_axis() {
     let scene = full_turn(
