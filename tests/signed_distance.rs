@@ -120,8 +120,17 @@ fn quarter(p: &[Big; 3]) -> Big {
     hypot(&plane, &max(dz, zero))
 }
 
+/// Name, profile, solid, closed form, places of interest.
+type Case = (
+    &'static str,
+    &'static str,
+    &'static str,
+    Form,
+    &'static [[f64; 2]],
+);
+
 /// Name, profile, solid, closed form, and places of interest in (r, z): centres, edges, the axis.
-const FORMS: [(&str, &str, &str, Form, &[[f64; 2]]); 8] = [
+const FORMS: [Case; 8] = [
     (
         "torus",
         "curves = [{ kind = 'circle', center = [2, 0], radius = 0.75 }]",
@@ -438,7 +447,7 @@ fn dense_search() {
             let bound = 1e-10 * size + 8.0 * f64::EPSILON * (p.length() + origin);
             compared += 1;
             let error = (found.abs() - wanted).abs();
-            if !(error / bound <= worst.0) {
+            if error.is_nan() || error / bound > worst.0 {
                 worst = (error / bound, p, found, wanted);
             }
         }
@@ -447,7 +456,7 @@ fn dense_search() {
             "{name:36} {compared} points, worst error {:.1e} size ({ratio:.1e} of the bound)",
             (found.abs() - wanted).abs() / size,
         );
-        if !(ratio <= 1.0) {
+        if ratio.is_nan() || ratio > 1.0 {
             failures += &format!("{name} at {p:?}: {found:e}, wanted {wanted:e}\n");
         }
     }
@@ -480,7 +489,10 @@ fn far_points_are_finite() {
                     let m = p.abs().max_element();
                     let wanted = m * ((p - middle) / m).length();
                     let bound = 2.0 * size + 1e-14 * wanted;
-                    if !((found - wanted).abs() <= bound) || scene.assembly().contains(p) {
+                    if found.is_nan()
+                        || (found - wanted).abs() > bound
+                        || scene.assembly().contains(p)
+                    {
                         failures += &format!("{name} at {p:?}: {found:e}, wanted {wanted:e}\n");
                     }
                 }

@@ -54,7 +54,7 @@ fn atan_inverse(n: f64) -> Big {
     for k in 0..200 {
         let term = &power / big(f64::from(2 * k + 1));
         sum = if k % 2 == 0 { sum + term } else { sum - term };
-        power = power / &n2;
+        power /= &n2;
     }
     sum
 }
@@ -72,8 +72,8 @@ pub(crate) fn cos_sin_degrees(degrees: &Big) -> [Big; 2] {
     let (mut even, mut odd) = (big(1.0), x);
     for k in 0..60_i32 {
         let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-        cos = cos + big(sign) * &even;
-        sin = sin + big(sign) * &odd;
+        cos += big(sign) * &even;
+        sin += big(sign) * &odd;
         let n = f64::from(2 * k);
         even = even * &x2 / big((n + 1.0) * (n + 2.0));
         odd = odd * &x2 / big((n + 2.0) * (n + 3.0));
@@ -205,8 +205,9 @@ fn interpolate(points: &[[Big; 2]], degree: usize) -> Vec<Piece> {
         for r in 0..n {
             if r != c && rows[r][c] != zero {
                 let factor = &rows[r][c] / &rows[c][c];
-                for k in c..n + 2 {
-                    rows[r][k] = &rows[r][k] - &factor * &rows[c][k];
+                let pivot = rows[c].clone();
+                for (value, above) in rows[r].iter_mut().zip(&pivot).skip(c) {
+                    *value = &*value - &factor * above;
                 }
             }
         }
@@ -230,11 +231,11 @@ fn basis(knots: &[Big], i: usize, degree: usize, u: &Big, count: usize) -> Big {
     let mut sum = big(0.0);
     let low = &knots[i + degree] - &knots[i];
     if low > big(0.0) {
-        sum = sum + (u - &knots[i]) / low * basis(knots, i, degree - 1, u, count);
+        sum += (u - &knots[i]) / low * basis(knots, i, degree - 1, u, count);
     }
     let high = &knots[i + degree + 1] - &knots[i + 1];
     if high > big(0.0) {
-        sum = sum + (&knots[i + degree + 1] - u) / high * basis(knots, i + 1, degree - 1, u, count);
+        sum += (&knots[i + degree + 1] - u) / high * basis(knots, i + 1, degree - 1, u, count);
     }
     sum
 }
@@ -633,9 +634,7 @@ fn turn_small(piece: &mut [[f64; 3]], from: i32, to: i32, margin: f64, depth: u3
     right[n - 1] = piece[n - 1];
     for level in 1..n {
         for i in (level..n).rev() {
-            for c in 0..3 {
-                piece[i][c] = 0.5 * (piece[i - 1][c] + piece[i][c]);
-            }
+            piece[i] = std::array::from_fn(|c| 0.5 * (piece[i - 1][c] + piece[i][c]));
         }
         right[n - 1 - level] = piece[n - 1];
     }
@@ -721,7 +720,7 @@ impl Solid {
         for step in &model.steps {
             match step {
                 PlaceStep::Scale(factor) => {
-                    scale = scale * big(*factor);
+                    scale *= big(*factor);
                     origin = origin.map(|x| x * big(*factor));
                 }
                 PlaceStep::Translate(by) => {
