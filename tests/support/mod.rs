@@ -1,0 +1,8 @@
+//! Helpers of the integration tests.
+
+#![allow(dead_code, reason = "each test file uses its share")]
+
+pub(crate) mod hard;
+pub(crate) mod oracle;
+pub(crate) mod sampling;
+pub(crate) mod text;
