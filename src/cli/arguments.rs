@@ -30,7 +30,13 @@ pub(super) struct Common {
     #[arg(long, global = true, help_heading = "Common options", value_name = "N")]
     pub(super) threads: Option<NonZeroUsize>,
     /// Say nothing but errors
-    #[arg(long, short, global = true, help_heading = "Common options", conflicts_with = "verbose")]
+    #[arg(
+        long,
+        short,
+        global = true,
+        help_heading = "Common options",
+        conflicts_with = "verbose"
+    )]
     pub(super) quiet: bool,
     /// Say what is being done, on standard error
     #[arg(long, short, global = true, help_heading = "Common options")]
@@ -40,7 +46,12 @@ pub(super) struct Common {
     pub(super) color: Color,
     /// Change a key of the scene, may be repeated: a dotted path with array indices from 0, and a
     /// value as TOML, else as a string (grid.resolution=64, solid.0.angle=270, units=mm)
-    #[arg(long, global = true, help_heading = "Common options", value_name = "PATH=VALUE")]
+    #[arg(
+        long,
+        global = true,
+        help_heading = "Common options",
+        value_name = "PATH=VALUE"
+    )]
     pub(super) set: Vec<String>,
     /// Write one JSON document to standard output, and nothing else there
     #[arg(long, global = true, help_heading = "Common options")]

@@ -139,16 +139,20 @@ pub fn quotient_derivative<T: Real>(a: &[T], w: &[T]) -> Coefficients<T> {
     difference(&product(&derivative(a), w), &product(a, &derivative(w)))
 }
 
+/// The largest absolute coefficient.
+#[must_use]
+pub fn magnitude(coefficients: &[Dd]) -> f64 {
+    coefficients.iter().fold(0.0, |m, c| m.max(c.f64().abs()))
+}
+
 /// Parameters in (0, 1) that separate every sign change of the polynomial.
 ///
 /// Each root of odd multiplicity lies within 2^-98 of a returned parameter; a root of even
 /// multiplicity, or a cluster too close to resolve, may add parameters that are not roots. The
-/// list ascends. A polynomial that vanishes to rounding has none.
+/// list ascends. `scale` is the size of the numbers whose differences the coefficients are: what is
+/// 2^-92 of it is rounding, and a polynomial of nothing else has no sign changes.
 #[must_use]
-pub fn sign_change_parameters(coefficients: &[Dd]) -> Vec<Dd> {
-    let scale = coefficients
-        .iter()
-        .fold(0.0_f64, |m, c| m.max(c.f64().abs()));
+pub fn sign_change_parameters(coefficients: &[Dd], scale: f64) -> Vec<Dd> {
     let mut found = Vec::new();
     if scale > 0.0 && scale.is_finite() {
         // Below this a coefficient is rounding of the products that made it.
@@ -242,7 +246,7 @@ mod tests {
         fn roots_are_found_to_thirty_digits(mut roots in proptest::collection::vec(0.001..0.999_f64, 1..9)) {
             roots.sort_by(f64::total_cmp);
             prop_assume!(roots.windows(2).all(|w| w[1] - w[0] > 1e-3));
-            let found = sign_change_parameters(&from_roots(&roots));
+            let found = sign_change_parameters(&from_roots(&roots), 1e-6);
             prop_assert_eq!(found.len(), roots.len());
             for (f, r) in found.iter().zip(&roots) {
                 // The condition of the root against the rounding of the coefficients.
@@ -262,7 +266,7 @@ mod tests {
 
     #[test]
     fn clustered_and_double_roots_are_separated_or_harmless() {
-        let found = sign_change_parameters(&from_roots(&[0.5, 0.5 + 1e-9, 0.5 + 2e-9]));
+        let found = sign_change_parameters(&from_roots(&[0.5, 0.5 + 1e-9, 0.5 + 2e-9]), 1.0);
         assert!(
             found.iter().any(|t| (t.f64() - 0.5).abs() < 1e-10),
             "{found:?}"
@@ -272,7 +276,7 @@ mod tests {
             "{found:?}"
         );
         // A double root changes no sign; extra parameters there are allowed, missing ones are not.
-        let found = sign_change_parameters(&from_roots(&[0.25, 0.25, 0.75]));
+        let found = sign_change_parameters(&from_roots(&[0.25, 0.25, 0.75]), 1.0);
         assert!(
             found.iter().any(|t| (t.f64() - 0.75).abs() < 1e-20),
             "{found:?}"

@@ -37,8 +37,10 @@ pub(crate) struct FilledBoundary {
     pub(crate) crossing: Option<[f64; 2]>,
 }
 
-/// Points nearer than this count as one, in the region's unit: some hundred roundings of f64.
-const COINCIDENT: f64 = 5e-14;
+/// Points nearer than this count as one, in the region's unit: four roundings of f64. Curves that
+/// are the same but for the rounding of their numbers coincide; a wall that f64 can tell does not
+/// vanish.
+const COINCIDENT: f64 = 4.0 * f64::EPSILON;
 
 /// The boundary of the set of points whose windings, one for each operand, `inside` accepts.
 /// `operand` tells which operand a piece belongs to.
@@ -60,10 +62,12 @@ pub(crate) fn filled_boundary(
     let mut kept = Vec::new();
     for (i, part) in parts.iter().enumerate() {
         if let Some(forward) = side(&set, &parts, &owner, operands, i, inside) {
-            kept.push(BoundaryPiece {
-                piece: part.clone(),
-                forward,
-            });
+            let mut even = Vec::new();
+            part.clone().even_parts(&mut even);
+            kept.extend(
+                even.into_iter()
+                    .map(|piece| BoundaryPiece { piece, forward }),
+            );
         }
     }
     FilledBoundary {
@@ -130,17 +134,16 @@ fn side(
 }
 
 /// The parts of a piece between the given parameters.
-fn cut_at(piece: &Piece, parameters: &[f64], parts: &mut Vec<Piece>) {
+fn cut_at(piece: &Piece, parameters: &[Dd], parts: &mut Vec<Piece>) {
     if parameters.is_empty() {
         parts.push(piece.clone());
         return;
     }
-    let mut cuts: Vec<f64> = parameters.to_vec();
-    cuts.sort_by(f64::total_cmp);
-    cuts.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
+    let mut cuts: Vec<Dd> = parameters.to_vec();
+    cuts.sort_by(|a, b| a.partial_cmp(b).expect("parameters are numbers"));
+    cuts.dedup_by(|a, b| (*a - *b).abs().f64() < (-60.0_f64).exp2());
     let mut from = (Dd::ZERO, piece.start);
     let ends = cuts.iter().map(|&t| {
-        let t = Dd::of(t);
         let p = if piece.degree() == 1 {
             [0, 1].map(|c| piece.start[c] + (piece.end[c] - piece.start[c]) * t)
         } else {
@@ -165,7 +168,7 @@ fn cut_at(piece: &Piece, parameters: &[f64], parts: &mut Vec<Piece>) {
 
 struct Meetings {
     /// For each piece, the parameters strictly inside it where it meets another.
-    parameters: Vec<Vec<f64>>,
+    parameters: Vec<Vec<Dd>>,
     crossing: Option<[f64; 2]>,
 }
 
@@ -261,7 +264,7 @@ fn meet(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
         for end in [x.start, x.end] {
             if let Some(t) = parameter_on(y, end) {
                 contacts += 1;
-                if t > 0.0 && t < 1.0 {
+                if t > Dd::ZERO && t < Dd::ONE {
                     found.parameters[k].push(t);
                 }
             }
@@ -272,8 +275,8 @@ fn meet(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
     }
     if a.degree() == 1 && b.degree() == 1 {
         if let Some((s, t)) = segments_cross(a, b) {
-            found.parameters[i].push(s);
-            found.parameters[j].push(t);
+            found.parameters[i].push(Dd::of(s));
+            found.parameters[j].push(Dd::of(t));
             let p = [0, 1].map(|c| a.start[c].f64() + s * (a.end[c] - a.start[c]).f64());
             found.crossing.get_or_insert(p);
         }
@@ -283,15 +286,15 @@ fn meet(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
 }
 
 /// The parameter of `p` on `piece`, where it lies on it: 0 or 1 at its ends.
-fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<f64> {
+fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<Dd> {
     let close = |q: [Dd; 2]| {
         (q[0] - p[0]).f64().abs() <= COINCIDENT && (q[1] - p[1]).f64().abs() <= COINCIDENT
     };
     if close(piece.start) {
-        return Some(0.0);
+        return Some(Dd::ZERO);
     }
     if close(piece.end) {
-        return Some(1.0);
+        return Some(Dd::ONE);
     }
     let extent = [
         (piece.end[0] - piece.start[0]).f64().abs(),
@@ -312,7 +315,7 @@ fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<f64> {
     } else {
         piece.parameter_at(c, p[c])
     };
-    ((piece.other_at(c, p[c]) - p[1 - c]).f64().abs() <= COINCIDENT).then(|| t.f64())
+    ((piece.other_at(c, p[c]) - p[1 - c]).f64().abs() <= COINCIDENT).then_some(t)
 }
 
 /// Whether the middle of what two pieces in contact at two points share is shared too.
@@ -362,10 +365,10 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
             seen.push(p);
             let inner = |t: &[f64; 2]| t[0] > 1e-9 && t[1] < 1.0 - 1e-9;
             if inner(&x.t) {
-                found.parameters[i].push(x.t[0]);
+                found.parameters[i].push(Dd::of(x.t[0]));
             }
             if inner(&y.t) {
-                found.parameters[j].push(y.t[0]);
+                found.parameters[j].push(Dd::of(y.t[0]));
             }
             if inner(&x.t) && inner(&y.t) && transversal(a, x.t[0], b, y.t[0]) {
                 found.crossing.get_or_insert(p);

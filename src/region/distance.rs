@@ -336,7 +336,8 @@ fn root(h: &[f64]) -> f64 {
             return t;
         }
         let newton = t - v / d;
-        if (v / d).abs() <= f64::EPSILON * 0.25 {
+        // Only where H rises: at a cusp it also touches zero without crossing.
+        if d > 0.0 && (v / d).abs() <= f64::EPSILON * 0.25 {
             return t;
         }
         let inside = newton > lo && newton < hi;

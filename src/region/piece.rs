@@ -321,6 +321,40 @@ impl Piece {
     }
 }
 
+impl Piece {
+    /// The piece in parts whose weights differ by no more than [`SKEW`], cut in the middle of the
+    /// longer extent. A heavy weight crowds most of a piece into parameters next to an end, where
+    /// f64 cannot tell them apart; in each part's own parameter it can.
+    pub(crate) fn even_parts(self, parts: &mut Vec<Self>) {
+        let weights = self.points.iter().map(|p| p[2].f64());
+        let (low, high) = weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
+        let extent = [0, 1].map(|c| (self.end[c] - self.start[c]).f64().abs());
+        let c = usize::from(extent[1] >= extent[0]);
+        if self.degree() == 1 || high <= SKEW * low || extent[c] < f64::EPSILON {
+            parts.push(self);
+            return;
+        }
+        let middle = (self.start[c] + self.end[c]) * Dd::of(0.5);
+        let t = self.parameter_at(c, middle);
+        if !(t > Dd::ZERO && t < Dd::ONE) {
+            parts.push(self);
+            return;
+        }
+        let at = self.at(t);
+        let halves = [
+            self.part(Dd::ZERO, t, self.start, at),
+            self.part(t, Dd::ONE, at, self.end),
+        ];
+        for half in halves {
+            half.even_parts(parts);
+        }
+    }
+}
+
+/// Ratio of weights up to which a piece's parameter is even enough: f64 then tells points 2^-47 of
+/// the piece apart.
+const SKEW: f64 = 32.0;
+
 /// -1, 0 or 1.
 pub(crate) fn sign(o: Option<Ordering>) -> i32 {
     match o {
@@ -389,10 +423,14 @@ pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
         } else {
             bernstein::quotient_derivative(c, &w)
         };
-        parameters.extend(bernstein::sign_change_parameters(&turning));
+        let scale = bernstein::magnitude(c) * bernstein::magnitude(&w);
+        parameters.extend(bernstein::sign_change_parameters(&turning, scale));
     }
     if r.iter().any(|x| *x < Dd::ZERO) {
-        parameters.extend(bernstein::sign_change_parameters(&r));
+        parameters.extend(bernstein::sign_change_parameters(
+            &r,
+            bernstein::magnitude(&r),
+        ));
     }
     parameters.sort_by(|a, b| a.partial_cmp(b).expect("parameters are numbers"));
     // Cuts closer than this would leave pieces that double-double cannot evaluate usefully.

@@ -940,7 +940,7 @@ fn files_that_cannot_be_read_are_told_from_bad_ones() {
     let shown = error.to_string();
     assert!(
         shown.contains("wal.csv, asked for by ")
-            && shown.ends_with("vase.toml:4:19: profiles.ring.curves[0].points.file"),
+            && shown.contains("vase.toml:4:19: profiles.ring.curves[0].points.file; check"),
         "{shown}"
     );
     let error = load_model(&folder_of.0.path().join("none.toml"), &[]);

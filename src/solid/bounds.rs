@@ -71,7 +71,9 @@ fn support(boundary: &[BoundaryPiece], a: Dd, m: Dd) -> Dd {
         }
         let f: Coefficients<Dd> = piece.points.iter().map(|p| a * p[1] + m * p[0]).collect();
         let w: Coefficients<Dd> = piece.points.iter().map(|p| p[2]).collect();
-        for t in bernstein::sign_change_parameters(&bernstein::quotient_derivative(&f, &w)) {
+        let scale = bernstein::magnitude(&f) * bernstein::magnitude(&w);
+        let turning = bernstein::quotient_derivative(&f, &w);
+        for t in bernstein::sign_change_parameters(&turning, scale) {
             let v = value(piece.at(t));
             if v > best {
                 best = v;
