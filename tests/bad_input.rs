@@ -717,6 +717,21 @@ fn touching_and_coincident_loops_are_answered() {
     );
 }
 
+/// A path there and back encloses nothing; on it, the point was inside at the distance of the outside.
+#[test]
+fn a_spike_without_area_is_answered() {
+    let spike = [
+        [1.0, 0.0],
+        [2.0, 0.0],
+        [2.0, 0.5],
+        [9.0, 0.5],
+        [2.0, 0.5],
+        [2.0, 1.0],
+        [1.0, 1.0],
+    ];
+    built("a spike", profile(&polygon(&spike)));
+}
+
 #[test]
 fn extreme_splines_are_answered() {
     let curve = |degree: usize, points: &[[f64; 2]], rest: &str| {
