@@ -91,6 +91,9 @@ impl<E: Into<Error>> From<E> for Failure {
     }
 }
 
+/// Longest line that is shown; an array of points can be one line of megabytes.
+const LONGEST_LINE: usize = 400;
+
 /// The lines of the scene around what is wrong.
 #[derive(Debug, thiserror::Error)]
 #[error("{message}")]
@@ -113,6 +116,16 @@ fn excerpt(error: &SceneError, colored: bool) -> String {
     let (Some(problem), Some((text, span))) = (error.problem(), error.source_text()) else {
         return String::new();
     };
+    // The lines that would be shown: the one that is wrong and its neighbours.
+    let line_start = |at: usize| text[..at].rfind('\n').map_or(0, |n| n + 1);
+    let first = line_start(span.start);
+    let before = line_start(first.saturating_sub(1));
+    let shown = text[before..]
+        .split('\n')
+        .take(if before < first { 3 } else { 2 });
+    if shown.map(str::len).any(|n| n > LONGEST_LINE) {
+        return String::new();
+    }
     // A span over many lines is marked at its first.
     let end = text[span.clone()]
         .find('\n')

@@ -1,8 +1,8 @@
 //! Signals: a flag that long work polls.
 
 use crate::error::Error;
-use signal_hook::consts::{SIGINT, SIGTERM};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 static SIGNAL: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
@@ -16,6 +16,9 @@ pub(super) fn listen() {
         // directory is swept by the next run.
         let _ = signal_hook::flag::register_usize(signal, Arc::clone(flag), signal as usize);
     }
+    // With a handler, a write beyond the limit on file sizes is an error like that of a full disk;
+    // without one it would end the process and leave the staging directory behind.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }
 
 /// An error when a signal has come.

@@ -13,7 +13,7 @@ use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
 };
 use crate::sample::{Channel, LayerBuffers, LayerSampler, Selection};
-use crate::scene::{ChannelName, CompressionName, FormatName, GridStep, Scene};
+use crate::scene::{ChannelName, CompressionName, FormatName, GridStep, Scene, nearest};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -102,11 +102,7 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         for text in given {
             let Some(value) = from(text) else {
                 let all: Vec<&str> = all.iter().map(|&v| name(v)).collect();
-                let nearest = all.iter().max_by(|a, b| {
-                    strsim::jaro_winkler(a, text).total_cmp(&strsim::jaro_winkler(b, text))
-                });
-                let hint = nearest
-                    .filter(|n| strsim::jaro_winkler(n, text) > 0.7)
+                let hint = nearest(text, all.iter().copied())
                     .map_or_else(String::new, |n| format!("; did you mean {n}?"));
                 return Err(Failure::usage(format!(
                     "{flag}: {text:?} is not one of {}{hint}",

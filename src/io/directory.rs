@@ -421,6 +421,9 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 /// Bytes that an ordinary user can still write at `path`, or at its nearest existing ancestor.
 ///
+/// A file system that counts no blocks at all tells nothing: then the answer is `u64::MAX`, and
+/// writing has to show.
+///
 /// # Errors
 /// [`IoError::Read`] when the file system cannot tell.
 pub fn available_bytes(path: impl AsRef<Path>) -> Result<u64, IoError> {
@@ -430,6 +433,9 @@ pub fn available_bytes(path: impl AsRef<Path>) -> Result<u64, IoError> {
         at.push(".");
     }
     let stat = rustix::fs::statvfs(&at).map_err(|errno| IoError::read(&at)(errno.into()))?;
+    if stat.f_blocks == 0 {
+        return Ok(u64::MAX);
+    }
     Ok(stat.f_bavail.saturating_mul(stat.f_frsize))
 }
 

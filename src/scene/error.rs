@@ -53,7 +53,7 @@ impl SceneError {
 /// Something in a text that cannot be.
 ///
 /// It displays as one line, `scenes/vase.toml:12:9: profiles.bowl.curves[1].weights[3]: found -0.5,
-/// wanted a finite number greater than 0`, and a hint after a semicolon where there is one.
+/// wanted a finite number greater than 0, at most 1e100`, and a hint after a semicolon where there is one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct InputProblem {

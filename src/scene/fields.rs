@@ -8,7 +8,7 @@ use super::value::{Entry, Kind, Value};
 /// What a number must be.
 pub(super) const FINITE: &str = "a finite number of magnitude at most 1e100";
 /// What a weight must be.
-pub(super) const WEIGHT: &str = "a finite number greater than 0";
+pub(super) const WEIGHT: &str = "a finite number greater than 0, at most 1e100";
 /// What a length must be.
 pub(super) const LENGTH: &str = "a length greater than 0 (1e-100 to 1e100)";
 

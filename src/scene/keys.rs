@@ -72,7 +72,7 @@ pub(super) const CURVES: &[(&str, &[&str])] = &[
 pub(super) const SOLIDS: &[(&str, &[&str])] = &[("revolve", SOLID)];
 
 /// The candidate nearest to `word`, when one is near enough to be what was meant.
-pub(super) fn nearest<'a>(
+pub(crate) fn nearest<'a>(
     word: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {

@@ -476,7 +476,7 @@ fn weights_are_checked() {
             &nurbs("1", FOUR, &format!("weights = [1, 1, 1, {bad}]")),
             &format!(
                 "vase.toml:6:21: profiles.ring.curves[0].weights[3]: found {bad}, wanted a finite number \
-                 greater than 0"
+                 greater than 0, at most 1e100"
             ),
         );
     }
@@ -878,7 +878,7 @@ fn errors_in_files_of_points_name_the_file() {
         ),
         (
             "1 0\n1 2 -3\n",
-            "wall.csv:2:5: profiles.ring.curves[0].points.file: found -3, wanted a finite number greater than 0",
+            "wall.csv:2:5: profiles.ring.curves[0].points.file: found -3, wanted a finite number greater than 0, at most 1e100",
         ),
         (
             "1 0\n1 nan\n",
