@@ -7,6 +7,7 @@ use super::output::{self, Console};
 use crate::error::Error;
 use crate::io::points;
 use crate::scene::Scene;
+use clap::ValueEnum;
 use rayon::prelude::*;
 use serde_json::json;
 use std::process::ExitCode;
@@ -22,6 +23,16 @@ pub(super) fn run(
     let scene = Scene::load_with(&arguments.scene, &common.set)?;
     for warning in scene.warnings() {
         console.warn(warning);
+    }
+    for (i, column) in arguments.columns.iter().enumerate() {
+        if arguments.columns[..i].contains(column) {
+            let name = column
+                .to_possible_value()
+                .map_or_else(String::new, |v| v.get_name().to_owned());
+            return Err(Failure::usage(format!(
+                "--columns: {name:?} is given twice"
+            )));
+        }
     }
     if let Some(path) = &arguments.output {
         points::check_table_name(path)?;

@@ -327,7 +327,9 @@ fn stream(
     writer: &StackWriter,
     console: &Console,
 ) -> Result<(f64, f64), Failure> {
-    let sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection);
+    let interrupted = || interrupt::check().is_err();
+    let sampler =
+        LayerSampler::new(scene.assembly(), &plan.grid, plan.selection).with_cancel(&interrupted);
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
@@ -339,6 +341,8 @@ fn stream(
         interrupt::check()?;
         let begin = Instant::now();
         sampler.sample(k, buffers);
+        // An interrupted layer is not whole.
+        interrupt::check()?;
         let sampled = Instant::now();
         let layer = LayerChannels {
             occupancy: has("occupancy").then_some(&buffers.occupancy),

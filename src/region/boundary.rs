@@ -35,7 +35,12 @@ pub(crate) struct FilledBoundary {
     pub(crate) pieces: Vec<BoundaryPiece>,
     /// A place where two pieces cross, in the region's unit.
     pub(crate) crossing: Option<[f64; 2]>,
+    /// How often pieces meet; above [`MOST_MEETINGS`] there are no pieces.
+    pub(crate) meetings: usize,
 }
+
+/// The most meetings of pieces that are sorted out: the work grows with their square.
+pub(crate) const MOST_MEETINGS: usize = 20_000;
 
 /// Points nearer than this count as one, in the region's unit: four roundings of f64. Curves that
 /// are the same but for the rounding of their numbers coincide; a wall that f64 can tell does not
@@ -51,28 +56,41 @@ pub(crate) fn filled_boundary(
     operands: usize,
 ) -> FilledBoundary {
     let meetings = meetings(pieces);
+    if meetings.count > MOST_MEETINGS {
+        return FilledBoundary {
+            pieces: Vec::new(),
+            crossing: meetings.crossing,
+            meetings: meetings.count,
+        };
+    }
     let mut parts = Vec::new();
-    let mut owner = Vec::new();
+    let (mut owner, mut from) = (Vec::new(), Vec::new());
     for (i, piece) in pieces.iter().enumerate() {
-        let before = parts.len();
         cut_at(piece, &meetings.parameters[i], &mut parts);
-        owner.extend(std::iter::repeat_n(operand(i), parts.len() - before));
+        owner.resize(parts.len(), operand(i));
+        from.resize(parts.len(), i);
     }
     let set = CrossingSet::new(&parts);
     let mut kept = Vec::new();
+    // The state on both sides can only change where a piece meets another, so along a loop that
+    // meets nothing one ray serves all pieces.
+    let mut known: Option<Option<bool>> = None;
     for (i, part) in parts.iter().enumerate() {
-        if let Some(forward) = side(&set, &parts, &owner, operands, i, inside) {
+        let carried =
+            known.filter(|_| !meetings.tangled[from[i]] && parts[i - 1].end == part.start);
+        let state = carried.unwrap_or_else(|| side(&set, &parts, &owner, operands, i, inside));
+        known = (!meetings.tangled[from[i]]).then_some(state);
+        if let Some(forward) = state {
             let mut even = Vec::new();
             part.clone().even_parts(&mut even);
-            kept.extend(
-                even.into_iter()
-                    .map(|piece| BoundaryPiece { piece, forward }),
-            );
+            let bounding = |piece| BoundaryPiece { piece, forward };
+            kept.extend(even.into_iter().map(bounding));
         }
     }
     FilledBoundary {
         pieces: kept,
         crossing: meetings.crossing,
+        meetings: meetings.count,
     }
 }
 
@@ -169,6 +187,9 @@ fn cut_at(piece: &Piece, parameters: &[Dd], parts: &mut Vec<Piece>) {
 struct Meetings {
     /// For each piece, the parameters strictly inside it where it meets another.
     parameters: Vec<Vec<Dd>>,
+    /// Whether a piece meets any but its neighbours in their common ends.
+    tangled: Vec<bool>,
+    count: usize,
     crossing: Option<[f64; 2]>,
 }
 
@@ -178,16 +199,32 @@ fn meetings(pieces: &[Piece]) -> Meetings {
     let tree = BoxTree::new(&boxes);
     let mut found = Meetings {
         parameters: vec![Vec::new(); pieces.len()],
+        tangled: vec![false; pieces.len()],
+        count: 0,
         crossing: None,
     };
     for (i, piece) in pieces.iter().enumerate() {
+        if found.count > MOST_MEETINGS {
+            break;
+        }
         tree.visit(
             |b| b.overlaps(&boxes[i]),
             |j| {
                 let j = j as usize;
-                if j > i && boxes[j].overlaps(&boxes[i]) && !meet_only_in_corners(piece, &pieces[j])
-                {
-                    meet(piece, &pieces[j], i, j, &mut found);
+                if j <= i || !boxes[j].overlaps(&boxes[i]) {
+                    return;
+                }
+                let other = &pieces[j];
+                let neighbours = piece.end == other.start || other.end == piece.start;
+                let tangled = if meet_only_in_corners(piece, other) {
+                    !neighbours
+                } else {
+                    meet(piece, other, i, j, neighbours, &mut found)
+                };
+                if tangled {
+                    found.tangled[i] = true;
+                    found.tangled[j] = true;
+                    found.count += 1;
                 }
             },
         );
@@ -257,32 +294,37 @@ impl Part {
     }
 }
 
-fn meet(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
+/// Notes where two pieces meet; whether they do so other than as neighbours.
+fn meet(a: &Piece, b: &Piece, i: usize, j: usize, neighbours: bool, found: &mut Meetings) -> bool {
     // Ends of one that lie on the other: these alone cut coincident stretches.
     let mut contacts = 0;
+    let mut inner = false;
     for (x, y, k) in [(a, b, j), (b, a, i)] {
         for end in [x.start, x.end] {
             if let Some(t) = parameter_on(y, end) {
                 contacts += 1;
                 if t > Dd::ZERO && t < Dd::ONE {
                     found.parameters[k].push(t);
+                    inner = true;
                 }
             }
         }
     }
     if contacts >= 2 && coincide(a, b) {
-        return;
+        return true;
     }
+    let touching = inner || contacts > 0 && !neighbours;
     if a.degree() == 1 && b.degree() == 1 {
-        if let Some((s, t)) = segments_cross(a, b) {
-            found.parameters[i].push(Dd::of(s));
-            found.parameters[j].push(Dd::of(t));
-            let p = [0, 1].map(|c| a.start[c].f64() + s * (a.end[c] - a.start[c]).f64());
-            found.crossing.get_or_insert(p);
-        }
-        return;
+        let Some((s, t)) = segments_cross(a, b) else {
+            return touching;
+        };
+        found.parameters[i].push(Dd::of(s));
+        found.parameters[j].push(Dd::of(t));
+        let p = [0, 1].map(|c| a.start[c].f64() + s * (a.end[c] - a.start[c]).f64());
+        found.crossing.get_or_insert(p);
+        return true;
     }
-    curves_cross(a, b, i, j, found);
+    curves_cross(a, b, i, j, found) || touching
 }
 
 /// The parameter of `p` on `piece`, where it lies on it: 0 or 1 at its ends.
@@ -344,13 +386,15 @@ fn segments_cross(a: &Piece, b: &Piece) -> Option<(f64, f64)> {
     (a0 * a1 < 0.0 && b0 * b1 < 0.0).then(|| (a0 / (a0 - a1), b0 / (b0 - b1)))
 }
 
-/// Crossings of two pieces of which one is curved, by halving both.
-fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) {
+/// Crossings of two pieces of which one is curved, by halving both; whether there are any away
+/// from common ends.
+fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) -> bool {
     const STEPS: usize = 20_000;
     let mut work = vec![(Part::whole(a), Part::whole(b))];
     let mut seen: Vec<[f64; 2]> = Vec::new();
+    let mut met = false;
     for _ in 0..STEPS {
-        let Some((x, y)) = work.pop() else { return };
+        let Some((x, y)) = work.pop() else { return met };
         if !x.bounds().grown(1e-15).overlaps(&y.bounds()) {
             continue;
         }
@@ -364,6 +408,7 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
         if x.extent().max(y.extent()) <= 1e-14 {
             seen.push(p);
             let inner = |t: &[f64; 2]| t[0] > 1e-9 && t[1] < 1.0 - 1e-9;
+            met |= inner(&x.t) || inner(&y.t);
             if inner(&x.t) {
                 found.parameters[i].push(Dd::of(x.t[0]));
             }
@@ -382,6 +427,8 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
             work.extend(y.halves(b).map(|h| (x, h)));
         }
     }
+    // Out of steps: nearly coincident over a stretch. The sides are asked part by part.
+    true
 }
 
 /// Whether two pieces that meet at interior parameters change sides there.

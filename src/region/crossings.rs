@@ -39,15 +39,6 @@ pub(crate) struct MeridianPoint {
     pub(crate) z_error: f64,
 }
 
-/// What crossing counting finds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Count {
-    /// The boundary passes through the point.
-    OnBoundary,
-    /// The crossings beyond the point.
-    Crossings(Winding),
-}
-
 /// Pieces arranged for counting.
 #[derive(Debug, Clone)]
 pub(crate) struct CrossingSet {
@@ -67,7 +58,7 @@ impl CrossingSet {
     }
 
     /// Crossings by f64 alone, `None` where the rounding does not decide.
-    pub(crate) fn count(&self, pieces: &[Piece], p: MeridianPoint) -> Option<Count> {
+    pub(crate) fn count(&self, pieces: &[Piece], p: MeridianPoint) -> Option<Winding> {
         let mut winding = Winding::default();
         let mut decided = true;
         // Boxes are rounded to nearest; one ulp of the unit square covers that.
@@ -127,11 +118,12 @@ impl CrossingSet {
                 _ => {}
             }
         });
-        decided.then_some(Count::Crossings(winding))
+        decided.then_some(winding)
     }
 
-    /// Crossings in double-double.
-    pub(crate) fn count_exact(&self, pieces: &[Piece], r: Dd, z: Dd) -> Count {
+    /// Crossings in double-double, and whether any piece passes through the point. Such pieces count
+    /// as passed, all alike, so that a path there and back changes nothing.
+    pub(crate) fn count_exact(&self, pieces: &[Piece], r: Dd, z: Dd) -> (Winding, bool) {
         let mut winding = Winding::default();
         let mut on = false;
         let margin = 4.0 * f64::EPSILON;
@@ -142,16 +134,12 @@ impl CrossingSet {
         let close = |a: Dd, b: Dd| (a - b).abs().f64() <= ON_BOUNDARY;
         self.tree.visit(near, |i| {
             let piece = &pieces[i as usize];
-            if on || piece.on_axis {
+            if piece.on_axis {
                 return;
             }
-            if [piece.start, piece.end]
+            on |= [piece.start, piece.end]
                 .iter()
-                .any(|v| close(v[0], r) && close(v[1], z))
-            {
-                on = true;
-                return;
-            }
+                .any(|v| close(v[0], r) && close(v[1], z));
             if piece.is_horizontal() {
                 let (a, b) = (piece.start[0], piece.end[0]);
                 on |= close(piece.start[1], z)
@@ -172,11 +160,7 @@ impl CrossingSet {
                 _ => {}
             }
         });
-        if on {
-            Count::OnBoundary
-        } else {
-            Count::Crossings(winding)
-        }
+        (winding, on)
     }
 
     /// Crossings at a larger coordinate `1 - c` along the line on which coordinate `c` is `v`,
@@ -230,6 +214,11 @@ impl ClosedSection {
         Self { pieces, crossings }
     }
 
+    /// Whether the boundary passes through the point.
+    pub(crate) fn meets(&self, r: Dd, z: Dd) -> bool {
+        self.crossings.count_exact(&self.pieces, r, z).1
+    }
+
     /// Whether the closed region holds the point, given exactly by its f64s.
     pub(crate) fn contains(&self, r: f64, z: f64) -> bool {
         let p = MeridianPoint {
@@ -238,14 +227,13 @@ impl ClosedSection {
             r_error: 0.0,
             z_error: 0.0,
         };
-        let count = self.crossings.count(&self.pieces, p);
-        match count.unwrap_or_else(|| {
-            self.crossings
-                .count_exact(&self.pieces, Dd::of(r), Dd::of(z))
-        }) {
-            Count::OnBoundary => true,
-            Count::Crossings(w) => w.crossings % 2 == 1,
+        if let Some(winding) = self.crossings.count(&self.pieces, p) {
+            return winding.crossings % 2 == 1;
         }
+        let (winding, on) = self
+            .crossings
+            .count_exact(&self.pieces, Dd::of(r), Dd::of(z));
+        on || winding.crossings % 2 == 1
     }
 }
 

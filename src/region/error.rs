@@ -56,6 +56,14 @@ pub enum RegionError {
         /// What is wrong and what is wanted.
         reason: String,
     },
+    /// The loops cross more often than is sorted out.
+    #[error(
+        "the loops meet each other more than {limit} times; simplify them, or split them over several profiles"
+    )]
+    Tangle {
+        /// The most meetings allowed.
+        limit: usize,
+    },
     /// The loops enclose nothing.
     #[error("the profile encloses no area")]
     NoArea,
@@ -76,7 +84,7 @@ impl RegionError {
             | Self::Curve {
                 loop_index, curve, ..
             } => Some((*loop_index, Some(*curve))),
-            Self::NoArea => None,
+            Self::NoArea | Self::Tangle { .. } => None,
         }
     }
 }

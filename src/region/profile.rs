@@ -5,7 +5,7 @@
 //! the same scene times 2^20 take the same branches to the last bit.
 
 use super::boundary::{self, BoundaryPiece};
-use super::crossings::{Count, CrossingSet, MeridianPoint, Winding};
+use super::crossings::{ClosedSection, CrossingSet, MeridianPoint, Winding};
 use super::curve::{self, Bezier, ProfileCurve};
 use super::error::RegionError;
 use super::piece::{self, Piece, TABLE};
@@ -61,6 +61,7 @@ pub struct Region {
     pieces: Vec<Piece>,
     crossings: CrossingSet,
     boundary: Vec<BoundaryPiece>,
+    closed: ClosedSection,
     warnings: Vec<String>,
 }
 
@@ -144,6 +145,11 @@ impl Region {
         tabulate(&mut pieces);
         let crossings = CrossingSet::new(&pieces);
         let outcome = boundary::filled_boundary(&pieces, &|w| fill.is_inside(w[0]), &|_| 0, 1);
+        if outcome.meetings > boundary::MOST_MEETINGS {
+            return Err(RegionError::Tangle {
+                limit: boundary::MOST_MEETINGS,
+            });
+        }
         if outcome.pieces.iter().all(|p| p.piece.on_axis) {
             return Err(RegionError::NoArea);
         }
@@ -161,6 +167,7 @@ impl Region {
             fill,
             pieces,
             crossings,
+            closed: ClosedSection::new(outcome.pieces.iter().map(|b| b.piece.clone()).collect()),
             boundary: outcome.pieces,
             warnings,
         })
@@ -221,14 +228,13 @@ impl Region {
     /// coordinates made on demand.
     #[inline]
     pub(crate) fn contains_point(&self, p: MeridianPoint, exact: impl FnOnce() -> [Dd; 2]) -> bool {
-        let count = self.crossings.count(&self.pieces, p).unwrap_or_else(|| {
-            let [r, z] = exact();
-            self.crossings.count_exact(&self.pieces, r, z)
-        });
-        match count {
-            Count::OnBoundary => true,
-            Count::Crossings(w) => self.fill.is_inside(w),
+        if let Some(winding) = self.crossings.count(&self.pieces, p) {
+            return self.fill.is_inside(winding);
         }
+        let [r, z] = exact();
+        let (winding, on) = self.crossings.count_exact(&self.pieces, r, z);
+        // A curve with the same state on both sides is not the region's boundary.
+        self.fill.is_inside(winding) || on && self.closed.meets(r, z)
     }
 }
 

@@ -17,7 +17,8 @@ use std::collections::BinaryHeap;
 
 /// Width of the bounds at which a divided voxel is done.
 const WIDTH: f64 = 2e-6;
-/// Most cells a voxel is divided into.
+/// Most cells a voxel that two bodies touch is divided into; fewer for more bodies, as each cell
+/// asks all of them.
 const CELLS: usize = 6_000;
 
 #[derive(Debug)]
@@ -151,7 +152,8 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
         gap += cell.gap();
         heap.push(cell);
     }
-    while gap > WIDTH * whole && heap.len() < CELLS {
+    let most = (2 * CELLS / bodies.len()).max(64);
+    while gap > WIDTH * whole && heap.len() < most {
         let Some(cell) = heap.pop() else { break };
         gap -= cell.gap();
         let half = cell.sides * 0.5;

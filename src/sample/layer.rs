@@ -61,13 +61,25 @@ pub struct LayerBuffers {
     pub fraction_sum: f64,
 }
 
+/// Asked between rows whether to stop.
+pub type Cancel<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// Samples the layers of one grid.
-#[derive(Debug)]
 pub struct LayerSampler<'a> {
+    cancel: Option<Cancel<'a>>,
     assembly: &'a Assembly,
     grid: &'a GridSpec,
     selection: Selection,
     fractions: Option<FractionSampler>,
+}
+
+impl std::fmt::Debug for LayerSampler<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LayerSampler")
+            .field("grid", self.grid)
+            .field("selection", &self.selection)
+            .finish_non_exhaustive()
+    }
 }
 
 /// What one thread reuses from row to row.
@@ -88,10 +100,20 @@ impl<'a> LayerSampler<'a> {
             .fraction
             .then(|| FractionSampler::new(assembly, grid.spacing()));
         Self {
+            cancel: None,
             assembly,
             grid,
             selection,
             fractions,
+        }
+    }
+
+    /// A sampler that leaves a layer unfinished once `cancel` says so.
+    #[must_use]
+    pub fn with_cancel(self, cancel: Cancel<'a>) -> Self {
+        Self {
+            cancel: Some(cancel),
+            ..self
         }
     }
 
@@ -136,6 +158,9 @@ impl<'a> LayerSampler<'a> {
             .map(|p| p.rows().layer(self.grid.centre(0, 0, k)))
             .collect();
         for j in 0..ny {
+            if self.cancel.is_some_and(|cancel| cancel()) {
+                return;
+            }
             self.flag_row(j, k, &layers, &mut scratch);
             let range = j * nx..(j + 1) * nx;
             let occupancy = &mut out.occupancy[range.clone()];

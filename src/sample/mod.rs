@@ -8,5 +8,5 @@ mod fraction;
 mod layer;
 mod volume;
 
-pub use layer::{Channel, LayerBuffers, LayerSampler, Selection};
+pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
 pub use volume::{fraction, material, occupancy, signed_distance};

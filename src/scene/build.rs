@@ -398,6 +398,11 @@ fn placed(model: &SceneModel, profile: &ProfileModel, error: &RegionError) -> Sc
             "a curve that can be drawn".to_owned(),
             None,
         ),
+        RegionError::Tangle { limit } => (
+            error.to_string(),
+            format!("loops that meet at most {limit} times"),
+            None,
+        ),
         _ => (
             error.to_string(),
             "curves that enclose an area".to_owned(),

@@ -174,10 +174,17 @@ impl Assembly {
         }
         let mut bodies = Vec::new();
         for group in groups {
-            for &i in &group {
-                parts[i].body = bodies.len();
+            if let Some(body) = joined(&parts, &group) {
+                for &i in &group {
+                    parts[i].body = bodies.len();
+                }
+                bodies.push(body);
+            } else {
+                for &i in &group {
+                    parts[i].body = bodies.len();
+                    bodies.push(alone(&parts[i]));
+                }
             }
-            bodies.push(joined(&parts, &group));
         }
         Self {
             parts,
@@ -308,15 +315,20 @@ fn coaxial(a: &Part, b: &Part) -> Option<(Dd, Dd, Dd)> {
     Some((k, if up { k } else { -k }, height / a.frame.scale_exact()))
 }
 
-/// The body of coaxial parts.
-fn joined(parts: &[Part], group: &[usize]) -> Body {
+/// The body of one part.
+fn alone(part: &Part) -> Body {
+    Body::new(
+        part.frame.clone(),
+        part.turn.clone(),
+        part.region.boundary().to_vec(),
+    )
+}
+
+/// The body of coaxial parts; `None` where they meet too often to be sorted out.
+fn joined(parts: &[Part], group: &[usize]) -> Option<Body> {
     let host = &parts[group[0]];
     if group.len() == 1 {
-        return Body::new(
-            host.frame.clone(),
-            host.turn.clone(),
-            host.region.boundary().to_vec(),
-        );
+        return Some(alone(host));
     }
     // The largest part sets the unit, so that no coordinate leaves the unit square by much.
     let host = group
@@ -339,5 +351,6 @@ fn joined(parts: &[Part], group: &[usize]) -> Body {
         &|i| owner[i],
         group.len(),
     );
-    Body::new(host.frame.clone(), host.turn.clone(), outcome.pieces)
+    (!outcome.pieces.is_empty())
+        .then(|| Body::new(host.frame.clone(), host.turn.clone(), outcome.pieces))
 }

@@ -185,10 +185,14 @@ impl RowSurface<'_> {
         let last = self.frame.to_local(row.centre_estimate(row.count - 1));
         let along = self.frame.vector_to_local(DVec3::new(row.step, 0.0, 0.0));
         let reach = first.point.abs().max(last.point.abs()).max_element();
-        let error = first.error.max(last.error).max_element() + 16.0 * f64::EPSILON * reach;
+        let mut error = first.error.max(last.error).max_element() + 16.0 * f64::EPSILON * reach;
         // The rounding of the step, over the whole row.
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
-        let error = error + 4.0 * f64::EPSILON * along.length() * row.count as f64;
+        let steps = row.count as f64;
+        error += 4.0 * f64::EPSILON * along.length() * steps;
+        // Voxel centres are rounded in the world, each on its own: off the line by an ulp there.
+        let far = row.first.abs().max_element() + row.step * steps;
+        error += 2.0 * f64::EPSILON * far * along.length() / row.step;
         LocalRow {
             start: first.point,
             along,
