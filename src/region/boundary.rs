@@ -42,10 +42,16 @@ pub(crate) struct FilledBoundary {
 /// The most meetings of pieces that are sorted out: the work grows with their square.
 pub(crate) const MOST_MEETINGS: usize = 20_000;
 
-/// Points nearer than this count as one, in the region's unit: four roundings of f64. Curves that
-/// are the same but for the rounding of their numbers coincide; a wall that f64 can tell does not
-/// vanish.
-const COINCIDENT: f64 = 4.0 * f64::EPSILON;
+/// Points of one profile nearer than this count as one, in the region's unit: what double-double
+/// leaves of curves given by the same numbers. A crack or wall that the numbers have stays.
+pub(crate) const SAME_PROFILE: f64 = 1.0 / (1_u128 << 80) as f64;
+
+/// Points of different solids nearer than this count as one: four roundings of f64, so that faces
+/// that were meant to touch leave no sheet between them.
+pub(crate) const SAME_FACE: f64 = 4.0 * f64::EPSILON;
+
+/// Room for the rounding of boxes and of points in f64.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// The boundary of the set of points whose windings, one for each operand, `inside` accepts.
 /// `operand` tells which operand a piece belongs to.
@@ -54,8 +60,9 @@ pub(crate) fn filled_boundary(
     inside: &dyn Fn(&[Winding]) -> bool,
     operand: &dyn Fn(usize) -> usize,
     operands: usize,
+    coincident: f64,
 ) -> FilledBoundary {
-    let meetings = meetings(pieces);
+    let meetings = meetings(pieces, coincident);
     if meetings.count > MOST_MEETINGS {
         return FilledBoundary {
             pieces: Vec::new(),
@@ -78,7 +85,8 @@ pub(crate) fn filled_boundary(
     for (i, part) in parts.iter().enumerate() {
         let carried =
             known.filter(|_| !meetings.tangled[from[i]] && parts[i - 1].end == part.start);
-        let state = carried.unwrap_or_else(|| side(&set, &parts, &owner, operands, i, inside));
+        let state =
+            carried.unwrap_or_else(|| side(&set, &parts, &owner, operands, coincident, i, inside));
         known = (!meetings.tangled[from[i]]).then_some(state);
         if let Some(forward) = state {
             let mut even = Vec::new();
@@ -100,6 +108,7 @@ fn side(
     parts: &[Piece],
     owner: &[usize],
     operands: usize,
+    coincident: f64,
     i: usize,
     inside: &dyn Fn(&[Winding]) -> bool,
 ) -> Option<bool> {
@@ -124,7 +133,7 @@ fn side(
         c,
         middle[c],
         middle[1 - c],
-        COINCIDENT,
+        coincident,
         |k, coincident, direction| {
             before[owner[k]].cross(direction);
             if coincident {
@@ -194,8 +203,8 @@ struct Meetings {
 }
 
 /// Where pieces meet other than at ends they share.
-fn meetings(pieces: &[Piece]) -> Meetings {
-    let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds.grown(COINCIDENT)).collect();
+fn meetings(pieces: &[Piece], coincident: f64) -> Meetings {
+    let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds.grown(ROUNDING)).collect();
     let tree = BoxTree::new(&boxes);
     let mut found = Meetings {
         parameters: vec![Vec::new(); pieces.len()],
@@ -219,7 +228,7 @@ fn meetings(pieces: &[Piece]) -> Meetings {
                 let tangled = if meet_only_in_corners(piece, other) {
                     !neighbours
                 } else {
-                    meet(piece, other, i, j, neighbours, &mut found)
+                    meet([piece, other], [i, j], neighbours, coincident, &mut found)
                 };
                 if tangled {
                     found.tangled[i] = true;
@@ -245,8 +254,7 @@ fn meet_only_in_corners(a: &Piece, b: &Piece) -> bool {
                         || (bb.max[c] <= p[c] && ab.min[c] >= p[c])
                 };
                 let wide = |c: usize| {
-                    ab.max[c] - ab.min[c] > 4.0 * COINCIDENT
-                        || bb.max[c] - bb.min[c] > 4.0 * COINCIDENT
+                    ab.max[c] - ab.min[c] > 4.0 * ROUNDING || bb.max[c] - bb.min[c] > 4.0 * ROUNDING
                 };
                 return apart(0) && wide(0) && apart(1) || apart(1) && wide(1) && apart(0);
             }
@@ -295,13 +303,19 @@ impl Part {
 }
 
 /// Notes where two pieces meet; whether they do so other than as neighbours.
-fn meet(a: &Piece, b: &Piece, i: usize, j: usize, neighbours: bool, found: &mut Meetings) -> bool {
+fn meet(
+    [a, b]: [&Piece; 2],
+    [i, j]: [usize; 2],
+    neighbours: bool,
+    coincident: f64,
+    found: &mut Meetings,
+) -> bool {
     // Ends of one that lie on the other: these alone cut coincident stretches.
     let mut contacts = 0;
     let mut inner = false;
     for (x, y, k) in [(a, b, j), (b, a, i)] {
         for end in [x.start, x.end] {
-            if let Some(t) = parameter_on(y, end) {
+            if let Some(t) = parameter_on(y, end, coincident) {
                 contacts += 1;
                 if t > Dd::ZERO && t < Dd::ONE {
                     found.parameters[k].push(t);
@@ -310,7 +324,7 @@ fn meet(a: &Piece, b: &Piece, i: usize, j: usize, neighbours: bool, found: &mut 
             }
         }
     }
-    if contacts >= 2 && coincide(a, b) {
+    if contacts >= 2 && coincide(a, b, coincident) {
         return true;
     }
     let touching = inner || contacts > 0 && !neighbours;
@@ -328,9 +342,9 @@ fn meet(a: &Piece, b: &Piece, i: usize, j: usize, neighbours: bool, found: &mut 
 }
 
 /// The parameter of `p` on `piece`, where it lies on it: 0 or 1 at its ends.
-fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<Dd> {
+fn parameter_on(piece: &Piece, p: [Dd; 2], coincident: f64) -> Option<Dd> {
     let close = |q: [Dd; 2]| {
-        (q[0] - p[0]).f64().abs() <= COINCIDENT && (q[1] - p[1]).f64().abs() <= COINCIDENT
+        (q[0] - p[0]).f64().abs() <= coincident && (q[1] - p[1]).f64().abs() <= coincident
     };
     if close(piece.start) {
         return Some(Dd::ZERO);
@@ -357,21 +371,21 @@ fn parameter_on(piece: &Piece, p: [Dd; 2]) -> Option<Dd> {
     } else {
         piece.parameter_at(c, p[c])
     };
-    ((piece.other_at(c, p[c]) - p[1 - c]).f64().abs() <= COINCIDENT).then_some(t)
+    ((piece.other_at(c, p[c]) - p[1 - c]).f64().abs() <= coincident).then_some(t)
 }
 
 /// Whether the middle of what two pieces in contact at two points share is shared too.
-fn coincide(a: &Piece, b: &Piece) -> bool {
+fn coincide(a: &Piece, b: &Piece, coincident: f64) -> bool {
     let (ab, bb) = (&a.bounds, &b.bounds);
     let min = [0, 1].map(|c| ab.min[c].max(bb.min[c]));
     let max = [0, 1].map(|c| ab.max[c].min(bb.max[c]));
     let c = usize::from(max[1] - min[1] >= max[0] - min[0]);
-    if !(max[c] - min[c] > 4.0 * COINCIDENT) {
+    if !(max[c] - min[c] > 4.0 * ROUNDING) {
         return true;
     }
     [0.31, 0.5, 0.73].iter().all(|s| {
         let v = Dd::of(min[c] + s * (max[c] - min[c]));
-        (a.other_at(c, v) - b.other_at(c, v)).f64().abs() <= COINCIDENT
+        (a.other_at(c, v) - b.other_at(c, v)).f64().abs() <= coincident
     })
 }
 

@@ -27,7 +27,7 @@ pub use distance::DistanceSet;
 pub use error::RegionError;
 pub use profile::{Boundary, Fill, ProfileLoop, Region};
 
-pub(crate) use boundary::{BoundaryPiece, filled_boundary};
+pub(crate) use boundary::{BoundaryPiece, SAME_FACE, filled_boundary};
 pub(crate) use crossings::{ClosedSection, MeridianPoint};
 pub(crate) use integrals::r_squared_dz as filled_integral;
 pub(crate) use piece::Piece;

@@ -144,7 +144,13 @@ impl Region {
         }
         tabulate(&mut pieces);
         let crossings = CrossingSet::new(&pieces);
-        let outcome = boundary::filled_boundary(&pieces, &|w| fill.is_inside(w[0]), &|_| 0, 1);
+        let outcome = boundary::filled_boundary(
+            &pieces,
+            &|w| fill.is_inside(w[0]),
+            &|_| 0,
+            1,
+            boundary::SAME_PROFILE,
+        );
         if outcome.meetings > boundary::MOST_MEETINGS {
             return Err(RegionError::Tangle {
                 limit: boundary::MOST_MEETINGS,

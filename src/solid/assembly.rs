@@ -10,7 +10,7 @@ use super::row::RowSurface;
 use super::turn::Turn;
 use crate::math::similarity::{DdVec, dot};
 use crate::math::{Aabb, Dd, Real, Similarity};
-use crate::region::{MeridianPoint, Piece, Region, filled_boundary};
+use crate::region::{MeridianPoint, Piece, Region, SAME_FACE, filled_boundary};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
@@ -350,6 +350,7 @@ fn joined(parts: &[Part], group: &[usize]) -> Option<Body> {
         &|w| w.iter().any(|w| w.crossings % 2 == 1),
         &|i| owner[i],
         group.len(),
+        SAME_FACE,
     );
     (!outcome.pieces.is_empty())
         .then(|| Body::new(host.frame.clone(), host.turn.clone(), outcome.pieces))
