@@ -39,6 +39,7 @@ mod value;
 
 pub use build::Scene;
 pub use error::{InputProblem, Place, SceneError, Sources};
+#[cfg(feature = "cli")]
 pub(crate) use keys::nearest;
 pub use limits::{
     MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME, MAX_TEXT_BYTES, MAX_VOXELS,
