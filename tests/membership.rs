@@ -164,3 +164,65 @@ fn powers_of_two_change_no_bit() {
     }
     assert!(failures.is_empty(), "{failures}");
 }
+
+/// At the height of a joint the piece below ends and the piece above begins: a ray there must count
+/// one of them. Heights are exact in f64 as the solid stands, and in double-double once scaled by 3.
+#[test]
+fn heights_of_joints_count_once() {
+    let radii = [2.0, 1.5, 1.75, 0.5, 3.0, 3.0, 1.0, 2.25];
+    let points: Vec<String> = radii
+        .iter()
+        .enumerate()
+        .map(|(k, r)| format!("[{r}, {k}]"))
+        .collect();
+    let chain = |place: &str| {
+        Scene::parse(&format!(
+            "schema = 1\n[profiles.p]\nboundary = \"to-axis\"\ncurves = [{{ kind = \"polyline\", points = [{}] }}]\n\
+             [[solid]]\nkind = \"revolve\"\nprofile = \"p\"\n{place}",
+            points.join(", ")
+        ))
+        .expect("a chain")
+    };
+    let torus = |place: &str| {
+        Scene::parse(&format!(
+            "schema = 1\n[profiles.p]\ncurves = [{{ kind = \"circle\", center = [2, 0], radius = 0.5 }}]\n\
+             [[solid]]\nkind = \"revolve\"\nprofile = \"p\"\n{place}"
+        ))
+        .expect("a torus")
+    };
+    for (place, scale) in [
+        ("", 1.0),
+        ("place = [{ scale = 3 }]", 3.0),
+        ("place = [{ scale = 0.25 }]", 0.25),
+    ] {
+        let chain = chain(place);
+        for (k, &radius) in radii.iter().enumerate() {
+            for step in 0..=256 {
+                // Multiples of 1/64, the radii of the joints among them.
+                let r = f64::from(step) / 64.0;
+                for p in [DVec3::new(r, 0.0, k as f64), DVec3::new(0.0, -r, k as f64)] {
+                    let found = chain.assembly().contains(p * scale);
+                    assert_eq!(
+                        found,
+                        r <= radius,
+                        "chain, {place}: {p} at a joint of radius {radius}"
+                    );
+                }
+            }
+        }
+        let torus = torus(place);
+        for step in 0..=256 {
+            let r = f64::from(step) / 64.0;
+            for (z, low, high) in [
+                (0.0, 1.5, 2.5),
+                (0.5, 2.0, 2.0),
+                (-0.5, 2.0, 2.0),
+                (0.515_625, 9.0, 9.0),
+            ] {
+                let p = DVec3::new(-r, 0.0, z);
+                let found = torus.assembly().contains(p * scale);
+                assert_eq!(found, r >= low && r <= high, "torus, {place}: {p}");
+            }
+        }
+    }
+}
