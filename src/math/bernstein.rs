@@ -179,7 +179,7 @@ fn isolate(c: &[Dd], a: Dd, b: Dd, noise: f64, depth: u32, found: &mut Vec<Dd>) 
     let half = Dd::of(0.5);
     let ends_clear = c[0].f64().abs() > noise && c[c.len() - 1].f64().abs() > noise;
     if changes == 1 && ends_clear {
-        found.push(a + (b - a) * bracketed_root(c));
+        found.push(a + (b - a) * bracketed_root(c, 0.5));
         return;
     }
     let middle = (a + b) * half;
@@ -195,27 +195,26 @@ fn isolate(c: &[Dd], a: Dd, b: Dd, noise: f64, depth: u32, found: &mut Vec<Dd>) 
     isolate(&right, middle, b, noise, depth + 1, found);
 }
 
-/// The one root of a polynomial whose end coefficients differ in sign: Newton's method kept
-/// inside a shrinking bracket.
-fn bracketed_root(c: &[Dd]) -> Dd {
-    let rising = c[0] < Dd::ZERO;
+/// The one root of a polynomial whose end coefficients differ in sign, from a first guess: Newton's
+/// method kept inside a shrinking bracket, to within 2^-98 of the parameter.
+#[must_use]
+pub fn bracketed_root(c: &[Dd], guess: f64) -> Dd {
+    let rising = c[0] < c[c.len() - 1];
     let (mut lo, mut hi) = (Dd::ZERO, Dd::ONE);
-    let mut t = Dd::of(0.5);
+    let mut t = Dd::of(guess);
     for _ in 0..240 {
         let (v, d) = evaluate_with_derivative(c, t);
         if v == Dd::ZERO {
-            return t;
+            break;
         }
         if (v < Dd::ZERO) == rising {
             lo = t;
         } else {
             hi = t;
         }
-        if (hi - lo).f64() <= super::tolerance::PARAMETER_RESOLUTION {
-            break;
-        }
         let step = if d == Dd::ZERO { Dd::ONE } else { v / d };
-        if step.abs().f64() <= super::tolerance::PARAMETER_RESOLUTION {
+        let width = (hi - lo).f64().min(step.abs().f64());
+        if width <= super::tolerance::PARAMETER_RESOLUTION {
             break;
         }
         let newton = t - step;

@@ -13,7 +13,7 @@
 use super::curve::{Bezier, HomogeneousPoint};
 use super::tree::Box2;
 use crate::math::bernstein::{self, Coefficients};
-use crate::math::tolerance::{ON_BOUNDARY, PARAMETER_RESOLUTION, gamma};
+use crate::math::tolerance::{ON_BOUNDARY, gamma};
 use crate::math::{Dd, Real};
 use std::cmp::Ordering;
 
@@ -128,7 +128,6 @@ impl Piece {
     /// The parameter at which coordinate `c` (0 is r, 1 is z) takes the value `v`, which must lie
     /// within the piece's range of it.
     pub(crate) fn parameter_at(&self, c: usize, v: Dd) -> Dd {
-        let rising = self.end[c] > self.start[c];
         if v == self.start[c] {
             return Dd::ZERO;
         }
@@ -136,37 +135,7 @@ impl Piece {
             return Dd::ONE;
         }
         let f: Coefficients<Dd> = self.points.iter().map(|p| p[c] - v * p[2]).collect();
-        let (mut lo, mut hi) = (Dd::ZERO, Dd::ONE);
-        let mut t = Dd::of(self.rough_parameter(c, v.f64()));
-        for _ in 0..240 {
-            let (value, slope) = bernstein::evaluate_with_derivative(&f, t);
-            if value == Dd::ZERO {
-                return t;
-            }
-            if (value < Dd::ZERO) == rising {
-                lo = t;
-            } else {
-                hi = t;
-            }
-            if (hi - lo).f64() <= PARAMETER_RESOLUTION {
-                break;
-            }
-            let step = if slope == Dd::ZERO {
-                Dd::ONE
-            } else {
-                value / slope
-            };
-            if step.abs().f64() <= PARAMETER_RESOLUTION {
-                break;
-            }
-            let newton = t - step;
-            t = if newton > lo && newton < hi {
-                newton
-            } else {
-                (lo + hi) * Dd::of(0.5)
-            };
-        }
-        t
+        bernstein::bracketed_root(&f, self.rough_parameter(c, v.f64()))
     }
 
     /// A start value for [`parameter_at`](Self::parameter_at): f64 bisection.
