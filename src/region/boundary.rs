@@ -85,10 +85,9 @@ pub(crate) fn filled_boundary(
     for (i, part) in parts.iter().enumerate() {
         let carried =
             known.filter(|_| !meetings.tangled[from[i]] && parts[i - 1].end == part.start);
-        let state =
-            carried.unwrap_or_else(|| side(&set, &parts, &owner, operands, coincident, i, inside));
-        known = (!meetings.tangled[from[i]]).then_some(state);
-        if let Some(forward) = state {
+        let state = carried.or_else(|| side(&set, &parts, &owner, operands, coincident, i, inside));
+        known = state.filter(|_| !meetings.tangled[from[i]]);
+        if let Some(Some(forward)) = state {
             let mut even = Vec::new();
             part.clone().even_parts(&mut even);
             let bounding = |piece| BoundaryPiece { piece, forward };
@@ -102,7 +101,8 @@ pub(crate) fn filled_boundary(
     }
 }
 
-/// `Some(forward)` where part `i` separates inside from outside.
+/// `Some(Some(forward))` where part `i` separates inside from outside, `Some(None)` where it does not;
+/// `None` where the part is too short for its ray to tell.
 fn side(
     set: &CrossingSet,
     parts: &[Piece],
@@ -111,7 +111,7 @@ fn side(
     coincident: f64,
     i: usize,
     inside: &dyn Fn(&[Winding]) -> bool,
-) -> Option<bool> {
+) -> Option<Option<bool>> {
     let part = &parts[i];
     let extent = [
         (part.end[0] - part.start[0]).f64(),
@@ -150,14 +150,14 @@ fn side(
     }
     let (inside_before, inside_beyond) = (inside(&before), inside(&beyond));
     if !first || inside_before == inside_beyond {
-        return None;
+        return Some(None);
     }
     // Travelling up, the left is at smaller r; travelling out, it is at larger z.
-    Some(if c == 1 {
+    Some(Some(if c == 1 {
         (extent[1] > 0.0) == inside_before
     } else {
         (extent[0] > 0.0) == inside_beyond
-    })
+    }))
 }
 
 /// The parts of a piece between the given parameters.
