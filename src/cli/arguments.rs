@@ -165,6 +165,8 @@ pub(super) enum Column {
     Inside,
     /// Signed distance
     Sdf,
+    /// 1 where the distance is exact, 0 where its size is a lower bound
+    Certainty,
 }
 
 #[derive(Debug, Args)]

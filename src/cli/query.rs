@@ -40,17 +40,22 @@ pub(super) fn run(
     let points = points::read_points(&arguments.points)?;
     let bar = console.bar(points.len() as u64, "points");
     let solid = scene.assembly();
-    let distances = points
+    let answers = points
         .par_chunks(CHUNK)
         .map(|chunk| {
             interrupt::check()?;
-            let values: Vec<f64> = chunk.iter().map(|&p| solid.signed_distance(p)).collect();
+            let values: Vec<(f64, bool)> = chunk
+                .iter()
+                .map(|&p| solid.signed_distance_with_certainty(p))
+                .collect();
             bar.inc(chunk.len() as u64);
             Ok(values)
         })
         .collect::<Result<Vec<_>, Error>>()?
         .concat();
     bar.finish_and_clear();
+    let distances: Vec<f64> = answers.iter().map(|a| a.0).collect();
+    let certainty: Vec<f64> = answers.iter().map(|a| f64::from(u8::from(a.1))).collect();
     // The sign is that of the membership, so the one column follows from the other.
     let inside: Vec<f64> = distances
         .iter()
@@ -62,6 +67,7 @@ pub(super) fn run(
         .map(|c| match c {
             Column::Inside => ("inside", inside.as_slice()),
             Column::Sdf => ("sdf", distances.as_slice()),
+            Column::Certainty => ("certainty", certainty.as_slice()),
         })
         .collect();
     let count = inside.iter().filter(|&&v| v != 0.0).count();

@@ -12,8 +12,9 @@ use crate::io::manifest::Manifest;
 use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
 };
-use crate::sample::{Channel, LayerBuffers, LayerSampler, Selection};
+use crate::sample::{Certainty, Channel, LayerBuffers, LayerSampler, Selection, Tally};
 use crate::scene::{ChannelName, CompressionName, FormatName, GridStep, Scene, nearest};
+use crate::solid::{Operation, Part};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -74,8 +75,8 @@ pub(super) fn run(
         plan.channels.clone(),
         options,
     )?;
-    let (sample, write) = stream(&scene, &plan, &writer, console)?;
-    let manifest = writer.finish(summary(&scene))?;
+    let (sample, write, tally) = stream(&scene, &plan, &writer, console)?;
+    let manifest = writer.finish(summary(&scene, &plan, &tally))?;
     let seconds = Seconds {
         prepare,
         sample,
@@ -326,7 +327,7 @@ fn stream(
     plan: &Plan,
     writer: &StackWriter,
     console: &Console,
-) -> Result<(f64, f64), Failure> {
+) -> Result<(f64, f64, Tally), Failure> {
     let interrupted = || interrupt::check().is_err();
     let sampler =
         LayerSampler::new(scene.assembly(), &plan.grid, plan.selection).with_cancel(&interrupted);
@@ -336,6 +337,7 @@ fn stream(
     let failed = AtomicBool::new(false);
     let failure: Mutex<Option<Error>> = Mutex::new(None);
     let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
+    let tally = Mutex::new(Tally::default());
     let has = |name: &str| plan.channels.iter().any(|c| c.name == name);
     let work = |buffers: &mut LayerBuffers, k: usize| -> Result<(), Error> {
         interrupt::check()?;
@@ -351,6 +353,10 @@ fn stream(
             material: plan.selection.material.then_some(&buffers.material),
         };
         writer.write_layer(k, &layer)?;
+        tally
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+            .add(&buffers.tally);
         for (total, time) in nanoseconds.iter().zip([sampled - begin, sampled.elapsed()]) {
             total.fetch_add(
                 u64::try_from(time.as_nanos()).unwrap_or(u64::MAX),
@@ -390,10 +396,63 @@ fn stream(
     // Thread time over the number of workers: the share of the wall time each stage took.
     #[allow(clippy::cast_precision_loss, reason = "times and counts")]
     let [sample, write] = nanoseconds.map(|n| n.into_inner() as f64 * 1e-9 / plan.workers as f64);
-    Ok((sample, write))
+    let tally = tally
+        .into_inner()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    Ok((sample, write, tally))
 }
 
-fn summary(scene: &Scene) -> StackSummary {
+fn operation_name(operation: Operation) -> &'static str {
+    match operation {
+        Operation::Add => "add",
+        Operation::Subtract => "subtract",
+        Operation::Intersect => "intersect",
+    }
+}
+
+/// How exact the distances are; those clamped to the band are not counted.
+fn certainty(count: &Certainty) -> Value {
+    json!({
+        "exact": count.exact,
+        "lower_bound": count.lower_bound,
+        "within_three_voxels": {
+            "exact": count.exact_near,
+            "lower_bound": count.lower_bound_near,
+            "exact_share": count.exact_share_near(),
+        },
+    })
+}
+
+/// What each material takes of the solid.
+fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<Value> {
+    let voxel = plan.grid.spacing().element_product();
+    let mut ids: Vec<u32> = scene
+        .assembly()
+        .parts()
+        .iter()
+        .map(Part::material)
+        .collect();
+    ids.sort_unstable();
+    ids.dedup();
+    let one = |id: u32| {
+        let voxels = tally.materials.get(&id).copied().unwrap_or(0);
+        let sampled = plan.selection.material.then_some(voxels);
+        #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
+        let volume = sampled.map(|n| n as f64 * voxel);
+        let part = scene.assembly().of_material(id);
+        let exact = part.and_then(|m| Some(m.single()?.volume().value));
+        json!({
+            "id": id,
+            "name": scene.model().materials.get(&id),
+            "voxels": sampled,
+            "volume_occupancy": volume,
+            "volume_exact": exact,
+        })
+    };
+    ids.into_iter().map(one).collect()
+}
+
+fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
     let b = scene.bounds();
     let solids: Vec<Value> = scene
         .assembly()
@@ -402,6 +461,7 @@ fn summary(scene: &Scene) -> StackSummary {
         .map(|p| {
             json!({
                 "name": p.name(),
+                "operation": operation_name(p.operation()),
                 "material": p.material(),
                 "bounds": [p.bounds().min.to_array(), p.bounds().max.to_array()],
                 "volume": p.volume().value,
@@ -414,6 +474,12 @@ fn summary(scene: &Scene) -> StackSummary {
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
         warnings: scene.warnings().to_vec(),
+        material_volumes: Value::Array(material_volumes(scene, plan, tally)),
+        certainty: if plan.selection.sdf {
+            certainty(&tally.certainty)
+        } else {
+            Value::Null
+        },
         scene: scene.model().resolve(),
         ..StackSummary::default()
     }

@@ -69,6 +69,8 @@ pub struct Manifest {
     pub materials: serde_json::Value,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Voxels and volumes of each material.
+    pub material_volumes: serde_json::Value,
     /// Where the distance is exact and where a lower bound.
     pub certainty: serde_json::Value,
     /// The resolved scene.
@@ -354,6 +356,7 @@ pub(super) mod tests {
             solids: serde_json::Value::Null,
             materials: serde_json::json!({ "1": "glass" }),
             warnings: vec![],
+            material_volumes: serde_json::Value::Null,
             certainty: serde_json::Value::Null,
             scene: serde_json::json!({ "schema": 1 }),
         }
@@ -397,6 +400,7 @@ pub(super) mod tests {
                 "solids",
                 "materials",
                 "warnings",
+                "material_volumes",
                 "certainty",
                 "scene"
             ]

@@ -116,6 +116,8 @@ pub struct StackSummary {
     pub materials: serde_json::Value,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Voxels and volumes of each material.
+    pub material_volumes: serde_json::Value,
     /// Where the distance is exact and where a lower bound.
     pub certainty: serde_json::Value,
     /// The resolved scene.
@@ -333,6 +335,7 @@ impl StackWriter {
             solids: summary.solids,
             materials: summary.materials,
             warnings,
+            material_volumes: summary.material_volumes,
             certainty: summary.certainty,
             scene: summary.scene,
         };

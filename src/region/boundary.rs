@@ -332,9 +332,9 @@ fn meet(
         let Some((s, t)) = segments_cross(a, b) else {
             return touching;
         };
-        found.parameters[i].push(Dd::of(s));
-        found.parameters[j].push(Dd::of(t));
-        let p = [0, 1].map(|c| a.start[c].f64() + s * (a.end[c] - a.start[c]).f64());
+        found.parameters[i].push(s);
+        found.parameters[j].push(t);
+        let p = [0, 1].map(|c| (a.start[c] + s * (a.end[c] - a.start[c])).f64());
         found.crossing.get_or_insert(p);
         return true;
     }
@@ -390,14 +390,15 @@ fn coincide(a: &Piece, b: &Piece, coincident: f64) -> bool {
 }
 
 /// Parameters of a proper crossing of two segments.
-fn segments_cross(a: &Piece, b: &Piece) -> Option<(f64, f64)> {
+fn segments_cross(a: &Piece, b: &Piece) -> Option<(Dd, Dd)> {
     let side = |p: &Piece, q: [Dd; 2]| {
         let d = [p.end[0] - p.start[0], p.end[1] - p.start[1]];
-        ((q[1] - p.start[1]) * d[0] - (q[0] - p.start[0]) * d[1]).f64()
+        (q[1] - p.start[1]) * d[0] - (q[0] - p.start[0]) * d[1]
     };
     let (b0, b1) = (side(a, b.start), side(a, b.end));
     let (a0, a1) = (side(b, a.start), side(b, a.end));
-    (a0 * a1 < 0.0 && b0 * b1 < 0.0).then(|| (a0 / (a0 - a1), b0 / (b0 - b1)))
+    let apart = |u: Dd, v: Dd| u.f64() * v.f64() < 0.0;
+    (apart(a0, a1) && apart(b0, b1)).then(|| (a0 / (a0 - a1), b0 / (b0 - b1)))
 }
 
 /// Crossings of two pieces of which one is curved, by halving both; whether there are any away
@@ -423,14 +424,16 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
             seen.push(p);
             let inner = |t: &[f64; 2]| t[0] > 1e-9 && t[1] < 1.0 - 1e-9;
             met |= inner(&x.t) || inner(&y.t);
-            if inner(&x.t) {
-                found.parameters[i].push(Dd::of(x.t[0]));
-            }
-            if inner(&y.t) {
-                found.parameters[j].push(Dd::of(y.t[0]));
-            }
+            let (mut s, mut t) = (Dd::of(x.t[0]), Dd::of(y.t[0]));
             if inner(&x.t) && inner(&y.t) && transversal(a, x.t[0], b, y.t[0]) {
                 found.crossing.get_or_insert(p);
+                (s, t) = polished([a, b], [s, t]).unwrap_or((s, t));
+            }
+            if inner(&x.t) {
+                found.parameters[i].push(s);
+            }
+            if inner(&y.t) {
+                found.parameters[j].push(t);
             }
             continue;
         }
@@ -443,6 +446,24 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
     }
     // Out of steps: nearly coincident over a stretch. The sides are asked part by part.
     true
+}
+
+/// The parameters at which two pieces cross, from estimates of them: Newton's method on
+/// `a(s) - b(t) = 0` with slopes in f64, which leave an error of a rounding's square.
+fn polished([a, b]: [&Piece; 2], [s0, t0]: [Dd; 2]) -> Option<(Dd, Dd)> {
+    let (mut s, mut t) = (s0, t0);
+    for _ in 0..4 {
+        let (p, q) = (a.at(s), b.at(t));
+        let gap = [p[0] - q[0], p[1] - q[1]];
+        let (u, v) = (a.twin.slope(s.f64()), b.twin.slope(t.f64()));
+        let determinant = u[1] * v[0] - u[0] * v[1];
+        // s' u - t' v = -gap, by Cramer's rule.
+        let over = |w: Dd| w / Dd::of(determinant);
+        s = s + over(gap[0] * Dd::of(v[1]) - gap[1] * Dd::of(v[0]));
+        t = t + over(gap[0] * Dd::of(u[1]) - gap[1] * Dd::of(u[0]));
+    }
+    let near = |x: Dd, y: Dd| (x - y).f64().abs() < 1e-9;
+    (near(s, s0) && near(t, t0)).then_some((s, t))
 }
 
 /// Whether two pieces that meet at interior parameters change sides there.

@@ -218,23 +218,6 @@ impl ClosedSection {
     pub(crate) fn meets(&self, r: Dd, z: Dd) -> bool {
         self.crossings.count_exact(&self.pieces, r, z).1
     }
-
-    /// Whether the closed region holds the point, given exactly by its f64s.
-    pub(crate) fn contains(&self, r: f64, z: f64) -> bool {
-        let p = MeridianPoint {
-            r,
-            z,
-            r_error: 0.0,
-            z_error: 0.0,
-        };
-        if let Some(winding) = self.crossings.count(&self.pieces, p) {
-            return winding.crossings % 2 == 1;
-        }
-        let (winding, on) = self
-            .crossings
-            .count_exact(&self.pieces, Dd::of(r), Dd::of(z));
-        on || winding.crossings % 2 == 1
-    }
 }
 
 /// Compares an f64 known to within `error` with an exact number; `None` where it does not decide.

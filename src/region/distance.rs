@@ -117,6 +117,24 @@ impl DistanceSet {
     }
 }
 
+impl DistanceSet {
+    /// The distance from (r, z) to the nearest piece and the point of it that is nearest; `None`
+    /// where there is no piece. Of several such points, that of the first piece found.
+    pub(crate) fn nearest(&self, point: [f64; 2]) -> Option<(f64, [f64; 2])> {
+        let mut best = f64::INFINITY;
+        let mut found = None;
+        self.tree.visit_nearest(point, best, |i, limit| {
+            let square = self.arcs[i as usize].distance_squared(point, limit);
+            if square < best {
+                best = square;
+                found = Some(i as usize);
+            }
+            best
+        });
+        found.map(|i| (best.sqrt(), self.arcs[i].foot(point)))
+    }
+}
+
 impl Arc {
     fn new(piece: &Piece) -> Self {
         let half = Dd::of(0.5);
@@ -177,8 +195,43 @@ impl Arc {
                     a.min(b)
                 }
             }
-            Shape::Rational(rational) => rational.distance_squared(q, limit.min(a).min(b)),
+            Shape::Rational(rational) => {
+                let mut best = Best::below(limit.min(a).min(b));
+                rational.minimise(q, &mut best);
+                best.square
+            }
         }
+    }
+
+    /// The nearest point of the piece.
+    fn foot(&self, point: [f64; 2]) -> [f64; 2] {
+        let q = [point[0] - self.origin[0], point[1] - self.origin[1]];
+        let [a, b] = self.ends.map(|e| square(q, e));
+        let end = self.ends[usize::from(b < a)];
+        let interior = match &self.shape {
+            Shape::Segment {
+                direction: d,
+                length_squared,
+            } => {
+                let s = ((q[0] - self.ends[0][0]) * d[0] + (q[1] - self.ends[0][1]) * d[1])
+                    / length_squared;
+                [0, 1].map(|c| self.ends[0][c] + s * d[c])
+            }
+            Shape::Circle { centre, radius } => {
+                let v = [q[0] - centre[0], q[1] - centre[1]];
+                let off = v[0].hypot(v[1]);
+                [0, 1].map(|c| centre[c] + v[c] / off * radius)
+            }
+            Shape::Rational(rational) => {
+                let mut best = Best::below(a.min(b));
+                rational.minimise(q, &mut best);
+                best.parameter.map_or(end, |t| rational.at(t))
+            }
+        };
+        // The piece's own distance tells whether the interior point is on it.
+        let on_piece = self.distance_squared(point, f64::INFINITY) < a.min(b);
+        let foot = if on_piece { interior } else { end };
+        [foot[0] + self.origin[0], foot[1] + self.origin[1]]
     }
 }
 
@@ -238,13 +291,27 @@ impl Rational {
         }
     }
 
-    fn square_at(&self, q: [f64; 2], t: f64) -> f64 {
+    fn at(&self, t: f64) -> [f64; 2] {
         let [r, z, w] = [0, 1, 2].map(|c| bernstein::evaluate(&self.coefficients[c], t));
-        square(q, [r / w, z / w])
+        [r / w, z / w]
     }
 
-    /// The smaller of `best` and the least interior minimum of the squared distance.
-    fn distance_squared(&self, q: [f64; 2], mut best: f64) -> f64 {
+    fn square_at(&self, q: [f64; 2], t: f64) -> f64 {
+        square(q, self.at(t))
+    }
+
+    fn try_at(&self, q: [f64; 2], t: f64, best: &mut Best) {
+        let square = self.square_at(q, t);
+        if square < best.square {
+            *best = Best {
+                square,
+                parameter: Some(t),
+            };
+        }
+    }
+
+    /// Lowers `best` to the least interior minimum of the squared distance.
+    fn minimise(&self, q: [f64; 2], best: &mut Best) {
         /// Roundings of one coefficient: three stored numbers, two products, two differences.
         const NOISE: f64 = 4.0 * f64::EPSILON;
         let [a, b, c] = &self.stationary;
@@ -257,12 +324,11 @@ impl Rational {
             h.push(if value.abs() <= noise { 0.0 } else { value });
         }
         match changes(&h) {
-            0 => best,
+            0 => {}
             1 => {
                 if rises(&h) {
-                    best = best.min(self.square_at(q, root(&h)));
+                    self.try_at(q, root(&h), best);
                 }
-                best
             }
             _ => self.search(q, h, best),
         }
@@ -270,7 +336,7 @@ impl Rational {
 
     /// Isolates the minima one by one.
     #[cold]
-    fn search(&self, q: [f64; 2], h: Coefficients<f64>, mut best: f64) -> f64 {
+    fn search(&self, q: [f64; 2], h: Coefficients<f64>, best: &mut Best) {
         const WIDTH: f64 = 1e-14;
         let mut work: SmallVec<[Interval; 8]> = SmallVec::new();
         work.push((h, 0.0, 1.0));
@@ -279,12 +345,12 @@ impl Rational {
                 0 => {}
                 1 => {
                     if rises(&h) {
-                        best = best.min(self.square_at(q, a + (b - a) * root(&h)));
+                        self.try_at(q, a + (b - a) * root(&h), best);
                     }
                 }
                 _ => {
                     let m = 0.5 * (a + b);
-                    best = best.min(self.square_at(q, m));
+                    self.try_at(q, m, best);
                     if b - a > WIDTH {
                         let (left, right) = bernstein::split(&h, 0.5);
                         work.push((left, a, m));
@@ -293,7 +359,22 @@ impl Rational {
                 }
             }
         }
-        best
+    }
+}
+
+/// The least squared distance so far, and the parameter that has it where that is inside the piece.
+#[derive(Debug, Clone, Copy)]
+struct Best {
+    square: f64,
+    parameter: Option<f64>,
+}
+
+impl Best {
+    fn below(square: f64) -> Self {
+        Self {
+            square,
+            parameter: None,
+        }
     }
 }
 

@@ -19,16 +19,21 @@ mod error;
 mod integrals;
 mod piece;
 mod profile;
+mod section;
 mod tree;
+mod weld;
 
 pub use crossings::Winding;
 pub use curve::ProfileCurve;
 pub use distance::DistanceSet;
 pub use error::RegionError;
 pub use profile::{Boundary, Fill, ProfileLoop, Region};
+pub use section::Side;
 
-pub(crate) use boundary::{BoundaryPiece, SAME_FACE, filled_boundary};
-pub(crate) use crossings::{ClosedSection, MeridianPoint};
+pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
+pub(crate) use crossings::MeridianPoint;
 pub(crate) use integrals::r_squared_dz as filled_integral;
 pub(crate) use piece::Piece;
+pub(crate) use section::Section;
 pub(crate) use tree::{Box2, BoxTree};
+pub(crate) use weld::welded;

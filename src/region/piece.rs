@@ -370,6 +370,15 @@ impl Twin {
         }
     }
 
+    /// The derivative at `t`.
+    pub(crate) fn slope(&self, t: f64) -> [f64; 2] {
+        let (w, dw) = bernstein::evaluate_with_derivative(&self.coefficients[2], t);
+        [0, 1].map(|c| {
+            let (v, dv) = bernstein::evaluate_with_derivative(&self.coefficients[c], t);
+            (dv * w - v * dw) / (w * w)
+        })
+    }
+
     /// The point at `t`, relative to the origin.
     #[inline]
     pub(crate) fn at(&self, t: f64) -> [f64; 2] {

@@ -5,15 +5,15 @@
 //! the same scene times 2^20 take the same branches to the last bit.
 
 use super::boundary::{self, BoundaryPiece};
-use super::crossings::{ClosedSection, CrossingSet, MeridianPoint, Winding};
+use super::crossings::Winding;
 use super::curve::{self, Bezier, ProfileCurve};
 use super::error::RegionError;
 use super::piece::{self, Piece, TABLE};
-use super::tree::BoxTree;
+use super::section::{Section, Side};
 use crate::math::tolerance::{BELOW_AXIS, GAP};
 use crate::math::{Dd, Real};
 use crate::nurbs::{self, BasisCache, KnotVector};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Curves in order, head to tail.
 pub type ProfileLoop = Vec<ProfileCurve>;
@@ -57,11 +57,8 @@ impl Fill {
 pub struct Region {
     unit: f64,
     size: f64,
-    fill: Fill,
-    pieces: Vec<Piece>,
-    crossings: CrossingSet,
+    section: Arc<Section>,
     boundary: Vec<BoundaryPiece>,
-    closed: ClosedSection,
     warnings: Vec<String>,
 }
 
@@ -143,7 +140,6 @@ impl Region {
             assemble(i, cuts, open, size, unit, &mut pieces)?;
         }
         tabulate(&mut pieces);
-        let crossings = CrossingSet::new(&pieces);
         let outcome = boundary::filled_boundary(
             &pieces,
             &|w| fill.is_inside(w[0]),
@@ -170,10 +166,7 @@ impl Region {
         Ok(Self {
             unit,
             size,
-            fill,
-            pieces,
-            crossings,
-            closed: ClosedSection::new(outcome.pieces.iter().map(|b| b.piece.clone()).collect()),
+            section: Arc::new(Section::new(pieces, fill, &outcome.pieces)),
             boundary: outcome.pieces,
             warnings,
         })
@@ -208,39 +201,15 @@ impl Region {
         &self.boundary
     }
 
-    /// A tree over the boxes of [`pieces`](Self::pieces).
-    pub(crate) fn tree(&self) -> &BoxTree {
-        self.crossings.tree()
-    }
-
-    /// Pieces of all loops, filled on both sides or not.
-    pub(crate) fn pieces(&self) -> &[Piece] {
-        &self.pieces
+    /// The region's membership.
+    pub(crate) fn section(&self) -> &Arc<Section> {
+        &self.section
     }
 
     /// Whether the closed region holds the point (r, z), r >= 0, given exactly by its f64s.
     #[must_use]
     pub fn contains(&self, r: f64, z: f64) -> bool {
-        let p = MeridianPoint {
-            r,
-            z,
-            r_error: 0.0,
-            z_error: 0.0,
-        };
-        self.contains_point(p, || [Dd::of(r), Dd::of(z)])
-    }
-
-    /// Whether the closed region holds a point known to within its errors, with its exact
-    /// coordinates made on demand.
-    #[inline]
-    pub(crate) fn contains_point(&self, p: MeridianPoint, exact: impl FnOnce() -> [Dd; 2]) -> bool {
-        if let Some(winding) = self.crossings.count(&self.pieces, p) {
-            return self.fill.is_inside(winding);
-        }
-        let [r, z] = exact();
-        let (winding, on) = self.crossings.count_exact(&self.pieces, r, z);
-        // A curve with the same state on both sides is not the region's boundary.
-        self.fill.is_inside(winding) || on && self.closed.meets(r, z)
+        self.section.side_of(r, z) != Side::Outside
     }
 }
 

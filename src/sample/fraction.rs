@@ -2,16 +2,17 @@
 //!
 //! A voxel that no surface touches is 0 or 1: its centre is at least half a diagonal from every
 //! surface. One that a single body touches takes that body's integral. Where several bodies touch
-//! it, each share s_b alone bounds the share of the union,
+//! it, each share s_f of a factor alone bounds the share of a term t and of the union of terms,
 //!
 //! ```text
-//!   max s_b <= s <= min(1, Σ s_b)
+//!   max(0, 1 - Σ_f (1 - s_f)) <= s_t <= min_f s_f          max_t s_t <= s <= min(1, Σ_t s_t)
 //! ```
 //!
 //! and the voxel is divided until the bounds sum to less than 2e-6.
 
 use crate::grid::GridSpec;
-use crate::solid::{Assembly, CellShape, TOLERANCE};
+use crate::region::Side;
+use crate::solid::{Assembly, CellShape, Factor, TOLERANCE, Term};
 use glam::DVec3;
 use std::collections::BinaryHeap;
 
@@ -49,7 +50,7 @@ impl FractionSampler {
         assembly: &Assembly,
         grid: &GridSpec,
         [j, k]: [usize; 2],
-        flags: &[Vec<u8>],
+        sides: &[Vec<Side>],
         out: &mut [f32],
     ) -> f64 {
         let bodies = assembly.bodies();
@@ -57,42 +58,43 @@ impl FractionSampler {
         // Beyond this many steps no distance is worth measuring.
         let horizon = self.reach + 16.0 * step;
         let mut clear = vec![0_usize; bodies.len()];
-        let mut touched = Vec::with_capacity(bodies.len());
+        let mut shares = vec![Share::Nothing; bodies.len()];
         let mut sum = 0.0;
         for (i, value) in out.iter_mut().enumerate() {
             let centre = grid.centre(i, j, k);
-            touched.clear();
-            let mut full = false;
             for (b, body) in bodies.iter().enumerate() {
-                let inside = assembly
-                    .parts()
-                    .iter()
-                    .zip(flags)
-                    .any(|(p, f)| p.body() == b && f[i] != 0);
-                if clear[b] == 0 {
-                    let d = body.distance(centre, inside, horizon);
-                    if d < self.reach {
-                        touched.push(b);
-                        continue;
-                    }
-                    // The next voxels within this distance stay clear of the surface.
-                    #[allow(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "at most 16"
-                    )]
-                    let steps = ((d - self.reach) / step * (1.0 - 1e-9)) as usize;
-                    clear[b] = steps;
-                } else {
+                let inside = sides[b][i] != Side::Outside;
+                shares[b] = Share::of(inside);
+                if clear[b] > 0 {
                     clear[b] -= 1;
+                    continue;
                 }
-                full |= inside;
+                let d = body.distance(centre, inside, horizon);
+                if d < self.reach {
+                    shares[b] = Share::Some;
+                    continue;
+                }
+                // The next voxels within this distance stay clear of the surface.
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "at most 16"
+                )]
+                let steps = ((d - self.reach) / step * (1.0 - 1e-9)) as usize;
+                clear[b] = steps;
             }
-            let share = match touched.as_slice() {
-                _ if full => 1.0,
-                [] => 0.0,
-                [b] => bodies[*b].fraction(&self.shapes[*b], centre, TOLERANCE),
-                several => union_share(assembly, several, centre, self.sides),
+            let share = match open_terms(assembly, &shares) {
+                None => 1.0,
+                Some(terms) => match terms.as_slice() {
+                    [] => 0.0,
+                    [term] if term.factors.len() == 1 => {
+                        let one = term.factors[0];
+                        let share =
+                            bodies[one.body].fraction(&self.shapes[one.body], centre, TOLERANCE);
+                        if one.complement { 1.0 - share } else { share }
+                    }
+                    several => divided_share(assembly, several, centre, self.sides),
+                },
             };
             sum += share;
             #[allow(
@@ -105,6 +107,44 @@ impl FractionSampler {
         }
         sum
     }
+}
+
+/// What is known of a body's share of a voxel without integrating.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Share {
+    Nothing,
+    /// Its surface may pass through the voxel.
+    Some,
+    All,
+}
+
+impl Share {
+    fn of(inside: bool) -> Self {
+        if inside { Self::All } else { Self::Nothing }
+    }
+}
+
+/// What is left to find out: the terms that may have a share of the voxel, without the factors
+/// that have it all; `None` where a term has it all.
+fn open_terms(assembly: &Assembly, shares: &[Share]) -> Option<Vec<Term>> {
+    let mut open = Vec::new();
+    for term in assembly.terms() {
+        let of = |f: &Factor| match (shares[f.body], f.complement) {
+            (Share::All, false) | (Share::Nothing, true) => Share::All,
+            (Share::Some, _) => Share::Some,
+            _ => Share::Nothing,
+        };
+        if term.factors.iter().any(|f| of(f) == Share::Nothing) {
+            continue;
+        }
+        let factors = term.factors.iter().copied();
+        let factors: Vec<Factor> = factors.filter(|f| of(f) == Share::Some).collect();
+        if factors.is_empty() {
+            return None;
+        }
+        open.push(Term { factors });
+    }
+    Some(open)
 }
 
 fn reach(sides: DVec3) -> f64 {
@@ -142,13 +182,20 @@ impl Ord for Cell {
     }
 }
 
-/// The share of a voxel inside the union of several bodies.
-fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3) -> f64 {
+/// The share of a voxel inside a union of terms.
+fn divided_share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3) -> f64 {
     let whole = sides.element_product();
+    let mut bodies: Vec<usize> = terms
+        .iter()
+        .flat_map(|t| t.factors.iter().map(|f| f.body))
+        .collect();
+    bodies.sort_unstable();
+    bodies.dedup();
+    let cell_of = |centre, sides| bounded(assembly, terms, &bodies, centre, sides, whole);
     let mut heap = BinaryHeap::new();
     let mut gap = 0.0;
-    for (centre, sides) in flat_faces_apart(assembly, bodies, centre, sides) {
-        let cell = bounded(assembly, bodies, centre, sides, whole);
+    for (centre, sides) in flat_faces_apart(assembly, &bodies, centre, sides) {
+        let cell = cell_of(centre, sides);
         gap += cell.gap();
         heap.push(cell);
     }
@@ -159,13 +206,8 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
         let half = cell.sides * 0.5;
         for n in 0..8 {
             let side = |bit: u32| if n >> bit & 1 == 1 { 0.5 } else { -0.5 };
-            let part = bounded(
-                assembly,
-                bodies,
-                cell.centre + half * DVec3::new(side(0), side(1), side(2)),
-                half,
-                whole,
-            );
+            let at = cell.centre + half * DVec3::new(side(0), side(1), side(2));
+            let part = cell_of(at, half);
             gap += part.gap();
             heap.push(part);
         }
@@ -181,30 +223,47 @@ fn union_share(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec
     (cells.iter().map(|c| 0.5 * (c.low + c.high)).sum::<f64>() / whole).clamp(0.0, 1.0)
 }
 
-fn bounded(assembly: &Assembly, bodies: &[usize], centre: DVec3, sides: DVec3, whole: f64) -> Cell {
+/// Bounds of the volume of a union of terms in a part of a voxel, from the shares of the bodies.
+fn bounded(
+    assembly: &Assembly,
+    terms: &[Term],
+    bodies: &[usize],
+    centre: DVec3,
+    sides: DVec3,
+    whole: f64,
+) -> Cell {
     let volume = sides.element_product();
-    let (mut low, mut high) = (0.0_f64, 0.0_f64);
-    for &b in bodies {
-        let body = &assembly.bodies()[b];
-        let inside = assembly
-            .parts()
-            .iter()
-            .any(|p| p.body() == b && p.contains(centre));
-        let share = if body.distance(centre, inside, reach(sides)) >= reach(sides) {
-            f64::from(u8::from(inside))
-        } else {
+    let reach = reach(sides);
+    let shares: Vec<f64> = bodies
+        .iter()
+        .map(|&b| {
+            let body = &assembly.bodies()[b];
+            let inside = body.contains(centre);
+            if body.distance(centre, inside, reach) >= reach {
+                return f64::from(u8::from(inside));
+            }
             // A small part of the voxel need not be known better than the voxel.
             let tolerance = (TOLERANCE * whole / volume).min(1e-4);
             body.fraction(&CellShape::new(body.frame(), sides), centre, tolerance)
-        };
-        low = low.max(share);
-        high += share;
+        })
+        .collect();
+    let share = |f: &Factor| {
+        let b = bodies.binary_search(&f.body);
+        let alone = b.map_or(0.0, |b| shares[b]);
+        if f.complement { 1.0 - alone } else { alone }
+    };
+    let (mut low, mut high) = (0.0_f64, 0.0_f64);
+    for term in terms {
+        let factors = || term.factors.iter().map(share);
+        low = low.max(1.0 - factors().map(|s| 1.0 - s).sum::<f64>());
+        high += factors().fold(1.0, f64::min);
     }
+    let high = high.min(1.0);
     Cell {
         centre,
         sides,
-        low: low * volume,
-        high: high.min(1.0) * volume,
+        low: low.min(high) * volume,
+        high: high * volume,
     }
 }
 

@@ -1,8 +1,11 @@
 //! One z layer of every channel.
 
 use super::fraction::FractionSampler;
+use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
-use crate::solid::{Assembly, Cuts, LayerCuts, Row};
+use crate::region::Side;
+use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Row, signed};
+use std::sync::Arc;
 
 /// A quantity sampled on a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -59,6 +62,8 @@ pub struct LayerBuffers {
     pub inside: u64,
     /// Sum of the fractions before they were rounded to f32.
     pub fraction_sum: f64,
+    /// What was counted on the way.
+    pub tally: Tally,
 }
 
 /// Asked between rows whether to stop.
@@ -71,6 +76,10 @@ pub struct LayerSampler<'a> {
     grid: &'a GridSpec,
     selection: Selection,
     fractions: Option<FractionSampler>,
+    /// The composite's bodies, then those that only tell materials apart.
+    surfaces: Vec<Arc<Body>>,
+    /// Surface and material of the added parts, the last first; empty where there is one material.
+    layered: Vec<(usize, u32)>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -84,12 +93,26 @@ impl std::fmt::Debug for LayerSampler<'_> {
 
 /// What one thread reuses from row to row.
 struct Scratch {
-    /// For each part, 1 where the row is inside it.
-    flags: Vec<Vec<u8>>,
+    /// For each surface, the sides of the row's voxels.
+    sides: Vec<Vec<Side>>,
     cuts: Cuts,
-    /// Unsigned distances to the bodies at the current and the last voxel.
-    distances: Vec<f64>,
-    limits: Vec<f64>,
+    reaches: Reaches,
+}
+
+/// Surfaces that tell the materials of a composite apart: those of its bodies and, where parts
+/// were joined, of the parts.
+fn material_surfaces(assembly: &Assembly) -> (Vec<Arc<Body>>, Vec<(usize, u32)>) {
+    let mut surfaces = assembly.bodies().to_vec();
+    let mut layered = Vec::new();
+    for part in assembly.added().rev() {
+        let known = surfaces.iter().position(|s| Arc::ptr_eq(s, part.body()));
+        let surface = known.unwrap_or_else(|| {
+            surfaces.push(part.body().clone());
+            surfaces.len() - 1
+        });
+        layered.push((surface, part.material()));
+    }
+    (surfaces, layered)
 }
 
 impl<'a> LayerSampler<'a> {
@@ -99,12 +122,21 @@ impl<'a> LayerSampler<'a> {
         let fractions = selection
             .fraction
             .then(|| FractionSampler::new(assembly, grid.spacing()));
+        let mut materials = assembly.added().map(Part::material);
+        let first = materials.next();
+        let (surfaces, layered) = if selection.material && materials.any(|m| Some(m) != first) {
+            material_surfaces(assembly)
+        } else {
+            (assembly.bodies().to_vec(), Vec::new())
+        };
         Self {
             cancel: None,
             assembly,
             grid,
             selection,
             fractions,
+            surfaces,
+            layered,
         }
     }
 
@@ -144,112 +176,129 @@ impl<'a> LayerSampler<'a> {
             .resize(if self.selection.material { n } else { 0 }, 0);
         out.inside = 0;
         out.fraction_sum = 0.0;
+        out.tally = Tally::default();
 
-        let parts = self.assembly.parts();
-        let bodies = self.assembly.bodies().len();
+        let band = self.selection.band.unwrap_or(f64::INFINITY);
         let mut scratch = Scratch {
-            flags: vec![vec![0; nx]; parts.len()],
+            sides: vec![vec![Side::Outside; nx]; self.surfaces.len()],
             cuts: Cuts::default(),
-            distances: vec![f64::INFINITY; bodies],
-            limits: vec![f64::INFINITY; bodies],
+            reaches: Reaches::new(self.assembly, band),
         };
-        let layers: Vec<LayerCuts> = parts
-            .iter()
-            .map(|p| p.rows().layer(self.grid.centre(0, 0, k)))
-            .collect();
+        let corner = self.grid.centre(0, 0, k);
+        let surfaces = self.surfaces.iter();
+        let layers: Vec<LayerCuts> = surfaces.map(|s| s.rows().layer(corner)).collect();
         for j in 0..ny {
             if self.cancel.is_some_and(|cancel| cancel()) {
                 return;
             }
-            self.flag_row(j, k, &layers, &mut scratch);
+            self.side_row(j, k, &layers, &mut scratch);
             let range = j * nx..(j + 1) * nx;
             let occupancy = &mut out.occupancy[range.clone()];
-            for flags in &scratch.flags {
-                for (o, f) in occupancy.iter_mut().zip(flags) {
-                    *o |= f;
-                }
-            }
+            self.occupancy_row(j, k, &scratch.sides, occupancy);
             out.inside += occupancy.iter().map(|&o| u64::from(o)).sum::<u64>();
             if self.selection.material {
                 let material = &mut out.material[range.clone()];
-                for (part, flags) in parts.iter().zip(&scratch.flags) {
-                    for (m, f) in material.iter_mut().zip(flags) {
-                        if *f != 0 {
-                            *m = part.material();
-                        }
-                    }
-                }
+                self.material_row(j, k, &scratch.sides, occupancy, material);
+                out.tally.count_materials(material);
             }
             if self.selection.sdf {
-                self.distance_row(j, k, &mut scratch, &mut out.sdf[range.clone()]);
+                let sdf = &mut out.sdf[range.clone()];
+                self.distance_row(j, k, &mut scratch, occupancy, sdf, &mut out.tally.certainty);
             }
             if let Some(fractions) = &self.fractions {
                 out.fraction_sum += fractions.row(
                     self.assembly,
                     self.grid,
                     [j, k],
-                    &scratch.flags,
+                    &scratch.sides,
                     &mut out.fraction[range],
                 );
             }
         }
     }
 
-    /// Marks the voxels of row (j, k) inside each part.
-    fn flag_row(&self, j: usize, k: usize, layers: &[LayerCuts], scratch: &mut Scratch) {
-        let nx = self.grid.dims()[0];
+    /// Finds the sides of the voxels of row (j, k).
+    fn side_row(&self, j: usize, k: usize, layers: &[LayerCuts], scratch: &mut Scratch) {
         let first = self.grid.centre(0, j, k);
         let row = Row {
             first,
             step: self.grid.spacing().x,
-            count: nx,
+            count: self.grid.dims()[0],
         };
-        for ((part, layer), flags) in self
-            .assembly
-            .parts()
-            .iter()
-            .zip(layers)
-            .zip(&mut scratch.flags)
-        {
-            let b = part.bounds();
+        for ((body, layer), sides) in self.surfaces.iter().zip(layers).zip(&mut scratch.sides) {
+            let b = body.bounds();
             let margin = 1e-9 * b.longest_side() + 64.0 * f64::EPSILON * first.abs().max_element();
             let misses = |c: usize| first[c] < b.min[c] - margin || first[c] > b.max[c] + margin;
             if misses(1) || misses(2) {
-                flags.fill(0);
+                sides.fill(Side::Outside);
                 continue;
             }
-            part.rows().cuts(layer, &row, &mut scratch.cuts);
+            body.rows().cuts(layer, &row, &mut scratch.cuts);
             scratch.cuts.runs(|from, to| {
                 let middle = self.grid.centre(from + (to - from) / 2, j, k);
-                flags[from..=to].fill(u8::from(part.contains(middle)));
+                sides[from..=to].fill(body.side(middle));
             });
         }
     }
 
-    fn distance_row(&self, j: usize, k: usize, scratch: &mut Scratch, out: &mut [f32]) {
-        let parts = self.assembly.parts();
-        let step = self.grid.spacing().x;
+    fn occupancy_row(&self, j: usize, k: usize, sides: &[Vec<Side>], out: &mut [u8]) {
+        for (i, occupied) in out.iter_mut().enumerate() {
+            let inside = self
+                .assembly
+                .holds(|b| sides[b][i], || self.grid.centre(i, j, k));
+            *occupied = u8::from(inside);
+        }
+    }
+
+    fn material_row(
+        &self,
+        j: usize,
+        k: usize,
+        sides: &[Vec<Side>],
+        occupancy: &[u8],
+        out: &mut [u32],
+    ) {
+        let only = self.assembly.parts()[0].material();
+        for (i, material) in out.iter_mut().enumerate() {
+            *material = if occupancy[i] == 0 {
+                0
+            } else if self.layered.is_empty() {
+                only
+            } else {
+                let mut layers = self.layered.iter();
+                let top = layers.find(|(s, _)| sides[*s][i] != Side::Outside);
+                top.map_or_else(
+                    || self.assembly.material_inside(self.grid.centre(i, j, k)),
+                    |&(_, m)| m,
+                )
+            };
+        }
+    }
+
+    fn distance_row(
+        &self,
+        j: usize,
+        k: usize,
+        scratch: &mut Scratch,
+        occupancy: &[u8],
+        out: &mut [f32],
+        certainty: &mut Certainty,
+    ) {
+        let spacing = self.grid.spacing();
         let band = self.selection.band.unwrap_or(f64::INFINITY);
-        scratch.limits.fill(band);
+        let near = 3.0 * spacing.max_element();
+        let Scratch { sides, reaches, .. } = scratch;
+        reaches.reset();
         for (i, value) in out.iter_mut().enumerate() {
             let point = self.grid.centre(i, j, k);
-            let flags = &scratch.flags;
-            let within = |b: usize| {
-                parts
-                    .iter()
-                    .zip(flags)
-                    .any(|(p, f)| p.body() == b && f[i] != 0)
-            };
-            scratch.distances.fill(f64::INFINITY);
-            let distances = &mut scratch.distances;
-            let d = self
-                .assembly
-                .signed_distance_within(point, within, &scratch.limits, |b, d| distances[b] = d);
-            *value = to_f32(d.clamp(-band, band));
-            // A distance changes by at most the step from voxel to voxel; a hair more covers the
-            // rounding of the two.
-            for (limit, d) in scratch.limits.iter_mut().zip(distances) {
-                *limit = ((*d + step) * (1.0 + 1e-9)).min(band);
+            let (side, inside) = (|b: usize| sides[b][i], occupancy[i] != 0);
+            let measured = self.assembly.measure_distance(point, side, inside, reaches);
+            *value = to_f32(signed(measured.distance, inside).clamp(-band, band));
+            reaches.moved(spacing.x);
+            // A clamped value says only how far the surface is at least.
+            if measured.distance < band {
+                let exact = self.assembly.is_exact(point, side, inside, measured);
+                certainty.count(exact, measured.distance <= near);
             }
         }
     }
@@ -261,7 +310,7 @@ fn to_f32(distance: f64) -> f32 {
         clippy::cast_possible_truncation,
         reason = "the one place where distances become f32"
     )]
-    let value = distance as f32;
+    let value = distance.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32;
     if distance > 0.0 && value == 0.0 {
         f32::from_bits(1)
     } else {

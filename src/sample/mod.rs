@@ -6,7 +6,9 @@
 
 mod fraction;
 mod layer;
+mod tally;
 mod volume;
 
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
+pub use tally::{Certainty, Tally};
 pub use volume::{fraction, material, occupancy, signed_distance};

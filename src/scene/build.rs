@@ -2,14 +2,14 @@
 
 use super::error::SceneError;
 use super::model::{
-    self, CurveKind, CurveModel, GridStep, Operation, PlaceStep, ProfileModel, SceneModel,
-    SolidKind, SolidModel,
+    self, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel, SolidKind,
+    SolidModel,
 };
 use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
 use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region, RegionError};
-use crate::solid::{Assembly, Part, Turn};
+use crate::solid::{Assembly, Operation, Part, Turn};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -79,19 +79,6 @@ impl Scene {
         let mut parts = Vec::new();
         for solid in &model.solids {
             let SolidKind::Revolve { profile, .. } = &solid.kind;
-            if solid.operation != Operation::Add {
-                let wanted = "\"add\"";
-                let hint = format!("{} is not built yet", solid.operation.name());
-                return Err(model
-                    .error(
-                        solid.place,
-                        &format!("{}.operation", solid.path),
-                        Some(format!("{:?}", solid.operation.name())),
-                        wanted,
-                        Some(hint),
-                    )
-                    .into());
-            }
             let region = if let Some(region) = regions.get(profile) {
                 region.clone()
             } else {
@@ -107,7 +94,13 @@ impl Scene {
                 regions.insert(*profile, region.clone());
                 region
             };
-            parts.push(part(&model, solid, region)?);
+            parts.push(
+                part(&model, solid, region)?.with_operation(match solid.operation {
+                    model::Operation::Add => Operation::Add,
+                    model::Operation::Subtract => Operation::Subtract,
+                    model::Operation::Intersect => Operation::Intersect,
+                }),
+            );
         }
         Ok(Self {
             assembly: Assembly::new(parts),
@@ -154,10 +147,7 @@ impl Scene {
     /// The exact volume in cubed scene units, where all solids make one body.
     #[must_use]
     pub fn exact_volume(&self) -> Option<f64> {
-        match self.assembly.bodies() {
-            [one] => Some(one.volume().value),
-            _ => None,
-        }
+        self.assembly.single().map(|one| one.volume().value)
     }
 
     /// BLAKE3 of the resolved scene, in hexadecimal.

@@ -1,194 +1,97 @@
-//! Several solids joined, each with its material; where they overlap the later one wins.
+//! Several solids composed: added, subtracted, intersected, in their order.
 //!
-//! Parts that share axis and turn are joined in the half-plane: their filled regions become one
-//! boundary, so that distance and fraction of the union are exact. Between the bodies that remain,
-//! the union's distance is the smallest outside and, inside, the largest depth: exact where bodies
-//! do not overlap, never more than the truth where they do.
+//! Membership is the boolean of the solids' own memberships, regularised: the composite is the
+//! closure of its interior. Distance is exact where the nearest point of the solid that decides is
+//! on the composite's boundary, and a lower bound of it elsewhere:
+//!
+//! ```text
+//!   inside    depth = max over terms that hold the point of (min over factors of d)
+//!   outside   gap   = min over terms of (max over factors that leave the point out of d)
+//! ```
 
 use super::body::Body;
-use super::row::RowSurface;
-use super::turn::Turn;
-use crate::math::similarity::{DdVec, dot};
-use crate::math::{Aabb, Dd, Real, Similarity};
-use crate::region::{MeridianPoint, Piece, Region, SAME_FACE, filled_boundary};
-use glam::{DVec2, DVec3};
+use super::part::{Operation, Part};
+use super::terms::{Factor, Term, terms};
+use crate::math::Aabb;
+use crate::region::Side;
+use glam::DVec3;
 use std::sync::Arc;
 
-/// One turned and placed region.
-#[derive(Debug, Clone)]
-pub struct Part {
-    name: String,
-    material: u32,
-    region: Arc<Region>,
-    /// Local lengths in the region's unit.
-    frame: Similarity,
-    turn: Turn,
-    bounds: Aabb,
-    margin: f64,
-    /// Index of the body whose boundary includes the part's.
-    body: usize,
-    volume: crate::math::quadrature::Integral,
-}
-
-/// Parts joined into one solid.
+/// Parts composed into one solid.
 #[derive(Debug, Clone)]
 pub struct Assembly {
     parts: Vec<Part>,
-    bodies: Vec<Body>,
+    bodies: Vec<Arc<Body>>,
+    terms: Vec<Term>,
     bounds: Aabb,
 }
 
-impl Part {
-    /// A region turned about the third axis of `frame` (local lengths in scene units).
-    #[must_use]
-    pub fn new(
-        name: String,
-        material: u32,
-        region: Arc<Region>,
-        frame: &Similarity,
-        turn: Turn,
-    ) -> Self {
-        let frame = frame.with_local_unit(region.unit());
-        let body = Body::new(frame.clone(), turn.clone(), region.boundary().to_vec());
-        let bounds = body.bounds();
-        // Far wider than any rounding of the bounds, far narrower than the solid.
-        let margin = 1e-9 * bounds.longest_side();
-        let volume = body.volume();
+/// What a distance was measured to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Measured {
+    /// Unsigned distance.
+    pub(crate) distance: f64,
+    /// Index of the term and the body that decided; `None` where nothing is within the limit.
+    pub(crate) by: Option<(usize, usize)>,
+}
+
+/// Upper bounds of the distances to the bodies, carried from one point to the next.
+#[derive(Debug, Clone)]
+pub(crate) struct Reaches {
+    upper: Vec<f64>,
+    /// Distances beyond this need not be known.
+    most: f64,
+}
+
+impl Reaches {
+    pub(crate) fn new(assembly: &Assembly, most: f64) -> Self {
         Self {
-            name,
-            material,
-            region,
-            frame,
-            turn,
-            bounds,
-            margin,
-            body: 0,
-            volume,
+            upper: vec![f64::INFINITY; assembly.bodies.len()],
+            most,
         }
     }
 
-    /// The part's name.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
+    /// Forgets the last point.
+    pub(crate) fn reset(&mut self) {
+        self.upper.fill(f64::INFINITY);
     }
 
-    /// The part's material id.
-    #[must_use]
-    pub fn material(&self) -> u32 {
-        self.material
-    }
-
-    /// The smallest box around the part, in scene units.
-    #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        self.bounds
-    }
-
-    /// The part's volume, in cubed scene units, with an estimate of its error.
-    #[must_use]
-    pub fn volume(&self) -> crate::math::quadrature::Integral {
-        self.volume
-    }
-
-    pub(crate) fn body(&self) -> usize {
-        self.body
-    }
-
-    /// The part as rows of voxels see it.
-    pub(crate) fn rows(&self) -> RowSurface<'_> {
-        RowSurface {
-            frame: &self.frame,
-            turn: &self.turn,
-            pieces: self.region.pieces(),
-            tree: self.region.tree(),
+    /// Moves on by `step`: a distance changes by at most that, and a hair more covers the rounding
+    /// of the two.
+    pub(crate) fn moved(&mut self, step: f64) {
+        for upper in &mut self.upper {
+            *upper = (*upper + step) * (1.0 + 1e-9);
         }
     }
 
-    /// What a user should know about the part's profile.
-    #[must_use]
-    pub fn warnings(&self) -> &[String] {
-        self.region.warnings()
-    }
-
-    /// Whether the closed part holds the point.
-    #[must_use]
-    #[inline]
-    pub fn contains(&self, point: DVec3) -> bool {
-        let margin = self.margin + 64.0 * f64::EPSILON * point.abs().max_element();
-        if !(point.cmpge(self.bounds.min - margin).all()
-            && point.cmple(self.bounds.max + margin).all())
-        {
-            return false;
+    /// The distance to body `b`, or `limit` where that is no more.
+    fn distance(&mut self, body: &Body, b: usize, point: DVec3, side: Side, limit: f64) -> f64 {
+        let upper = self.upper[b];
+        let found = body.distance(point, side != Side::Outside, upper.min(limit));
+        if found < limit || upper <= limit {
+            self.upper[b] = found;
         }
-        let local = self.frame.to_local(point);
-        let p = local.point;
-        let flat = DVec2::new(p.x, p.y);
-        let flat_error = local.error.x + local.error.y;
-        // One exact transformation serves both questions.
-        let mut exact: Option<DdVec> = None;
-        if let Turn::Partial(wedge) = &self.turn {
-            let answer = wedge.contains(flat, flat_error).unwrap_or_else(|| {
-                let e = *exact.get_or_insert_with(|| self.frame.to_local_exact(point));
-                wedge.contains_exact([e[0], e[1]])
-            });
-            if !answer {
-                return false;
-            }
-        }
-        let rho = flat.x.hypot(flat.y);
-        let meridian = MeridianPoint {
-            r: rho,
-            z: p.z,
-            r_error: flat_error + 4.0 * f64::EPSILON * rho,
-            z_error: local.error.z,
-        };
-        self.region.contains_point(meridian, || {
-            let e = exact.unwrap_or_else(|| self.frame.to_local_exact(point));
-            [(e[0] * e[0] + e[1] * e[1]).sqrt(), e[2]]
-        })
+        found
     }
 }
 
 impl Assembly {
-    /// The union of the parts, in the order of their precedence: the last wins.
+    /// The composite of the parts, in their order; the first is added whatever its operation. Where
+    /// added parts overlap, the last gives the material.
     ///
     /// # Panics
     /// When there is no part.
     #[must_use]
     pub fn new(mut parts: Vec<Part>) -> Self {
-        let first = parts
-            .first()
-            .expect("an assembly has at least one part")
-            .bounds;
-        let bounds = parts.iter().fold(first, |b, p| b.union(&p.bounds));
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        for i in 0..parts.len() {
-            match groups
-                .iter_mut()
-                .find(|g| coaxial(&parts[g[0]], &parts[i]).is_some())
-            {
-                Some(group) => group.push(i),
-                None => groups.push(vec![i]),
-            }
-        }
-        let mut bodies = Vec::new();
-        for group in groups {
-            if let Some(body) = joined(&parts, &group) {
-                for &i in &group {
-                    parts[i].body = bodies.len();
-                }
-                bodies.push(body);
-            } else {
-                for &i in &group {
-                    parts[i].body = bodies.len();
-                    bodies.push(alone(&parts[i]));
-                }
-            }
-        }
+        let first = parts.remove(0).with_operation(Operation::Add);
+        parts.insert(0, first);
+        let added = parts.iter().filter(|p| p.operation() == Operation::Add);
+        let bounds = added.fold(parts[0].bounds(), |b, p| b.union(&p.bounds()));
+        let composed = terms(&parts);
         Self {
             parts,
-            bodies,
+            bodies: composed.bodies,
+            terms: composed.terms,
             bounds,
         }
     }
@@ -199,159 +102,285 @@ impl Assembly {
         &self.parts
     }
 
-    /// The bodies that the parts make.
+    /// The bodies whose booleans the composite is: parts that share axis and turn are one.
     #[must_use]
-    pub fn bodies(&self) -> &[Body] {
+    pub fn bodies(&self) -> &[Arc<Body>] {
         &self.bodies
     }
 
-    /// The smallest box around all parts, in scene units.
+    pub(crate) fn terms(&self) -> &[Term] {
+        &self.terms
+    }
+
+    /// The one body that the composite is, where it is one.
+    #[must_use]
+    pub fn single(&self) -> Option<&Body> {
+        match self.terms.as_slice() {
+            [Term { factors }] => match factors.as_slice() {
+                [one] if !one.complement => Some(&self.bodies[one.body]),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The smallest box around all added parts, in scene units.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
+    /// Whether the composite is known to be empty without measuring it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.terms.is_empty()
+    }
+
     /// Whether the solid holds the point.
     #[must_use]
     pub fn contains(&self, point: DVec3) -> bool {
-        self.parts.iter().any(|p| p.contains(point))
+        self.holds(|b| self.bodies[b].side(point), || point)
     }
 
-    /// The material at the point: that of the last part holding it, 0 outside.
+    /// Whether the solid holds a point whose sides are known.
+    #[inline]
+    pub(crate) fn holds(&self, side: impl Fn(usize) -> Side, point: impl Fn() -> DVec3) -> bool {
+        self.terms.iter().any(|term| {
+            let mut on = 0;
+            for factor in &term.factors {
+                match factor.side(side(factor.body)) {
+                    Side::Outside => return false,
+                    Side::On => on += 1,
+                    Side::Inside => {}
+                }
+            }
+            // A point on one surface is in the closure of the interior; one on several may be on
+            // a sheet that faces leave where they touch.
+            on <= 1 || self.interior_is_near(term, point())
+        })
+    }
+
+    /// Whether the interior of a term comes within a few roundings of the point.
+    #[cold]
+    fn interior_is_near(&self, term: &Term, point: DVec3) -> bool {
+        let sizes = term.factors.iter().map(|f| self.bodies[f.body].bounds());
+        let size = sizes.fold(f64::INFINITY, |m, b| m.min(b.longest_side()));
+        // Below the band of 8 ε in which either answer is right, in every direction.
+        let step = 4.0 * f64::EPSILON * (size + point.abs().max_element());
+        let interior = |p: DVec3| {
+            let mut factors = term.factors.iter();
+            factors.all(|f| f.side(self.bodies[f.body].side(p)) == Side::Inside)
+        };
+        let places = (0..27_u32).filter(|n| *n != 13);
+        places.into_iter().any(|n| {
+            let offset = |d: u32| f64::from(n / d % 3) - 1.0;
+            interior(point + step * DVec3::new(offset(1), offset(3), offset(9)))
+        })
+    }
+
+    /// The material at the point: that of the last added part holding it, 0 outside.
     #[must_use]
     pub fn material(&self, point: DVec3) -> u32 {
-        self.parts
-            .iter()
-            .rev()
-            .find(|p| p.contains(point))
-            .map_or(0, |p| p.material)
+        if self.contains(point) {
+            self.material_inside(point)
+        } else {
+            0
+        }
     }
 
-    /// Signed distance, negative inside, in scene units.
+    /// The material at a point of the composite.
+    pub(crate) fn material_inside(&self, point: DVec3) -> u32 {
+        let added = || self.added();
+        let holding = added().rev().find(|p| p.contains(point));
+        // In a crack between faces that count as touching no part holds the point.
+        let nearest = || {
+            let distance = |p: &Part| p.body().distance(point, false, f64::INFINITY);
+            added().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        };
+        holding.or_else(nearest).map_or(0, Part::material)
+    }
+
+    /// The part of the composite that has a material: what the parts of other materials cover later
+    /// is taken from it. `None` where no added part has the material.
+    #[must_use]
+    pub fn of_material(&self, material: u32) -> Option<Self> {
+        let own = |p: &Part| p.operation() == Operation::Add && p.material() == material;
+        let steps = self.parts.iter().skip_while(|p| !own(p)).cloned();
+        let parts: Vec<Part> = steps
+            .map(|p| match p.operation() {
+                Operation::Add if !own(&p) => p.with_operation(Operation::Subtract),
+                _ => p,
+            })
+            .collect();
+        (!parts.is_empty()).then(|| Self::new(parts))
+    }
+
+    /// The added parts, in order.
+    pub(crate) fn added(&self) -> impl DoubleEndedIterator<Item = &Part> {
+        let parts = self.parts.iter();
+        parts.filter(|p| p.operation() == Operation::Add)
+    }
+
+    /// Signed distance, negative inside, in scene units; a lower bound of its size where the
+    /// distance of a composite is not exact.
     #[must_use]
     pub fn signed_distance(&self, point: DVec3) -> f64 {
-        let mut inside = vec![false; self.bodies.len()];
-        for part in &self.parts {
-            inside[part.body] |= part.contains(point);
-        }
-        let limits = vec![f64::INFINITY; self.bodies.len()];
-        self.signed_distance_within(point, |b| inside[b], &limits, |_, _| {})
+        self.signed_distance_with_certainty(point).0
     }
 
-    /// Signed distance where it is known which bodies hold the point, and no further from each
-    /// body than its limit. `found` receives the unsigned distance to each body that was measured.
+    /// Signed distance, negative inside, in scene units, and whether it is exact; else its size is
+    /// a lower bound.
+    #[must_use]
+    pub fn signed_distance_with_certainty(&self, point: DVec3) -> (f64, bool) {
+        let sides: Vec<Side> = self.bodies.iter().map(|b| b.side(point)).collect();
+        let side = |b: usize| sides[b];
+        let inside = self.holds(side, || point);
+        let mut reaches = Reaches::new(self, f64::INFINITY);
+        let measured = self.measure_distance(point, side, inside, &mut reaches);
+        let certain = self.is_exact(point, side, inside, measured);
+        (signed(measured.distance, inside), certain)
+    }
+
+    /// The unsigned distance of a point whose sides are known.
     #[inline]
-    pub(crate) fn signed_distance_within(
+    pub(crate) fn measure_distance(
         &self,
         point: DVec3,
-        inside: impl Fn(usize) -> bool,
-        limits: &[f64],
-        mut found: impl FnMut(usize, f64),
-    ) -> f64 {
-        let mut depth = f64::NEG_INFINITY;
-        let mut gap = f64::INFINITY;
-        for (b, body) in self.bodies.iter().enumerate() {
-            let within = inside(b);
-            if !within && depth >= 0.0 {
+        side: impl Fn(usize) -> Side,
+        inside: bool,
+        reaches: &mut Reaches,
+    ) -> Measured {
+        if inside {
+            self.depth(point, side, reaches)
+        } else {
+            self.gap(point, side, reaches)
+        }
+    }
+
+    fn depth(&self, point: DVec3, side: impl Fn(usize) -> Side, reaches: &mut Reaches) -> Measured {
+        let mut deepest = Measured {
+            distance: -1.0,
+            by: None,
+        };
+        let leaves_out = |term: &Term| {
+            term.factors
+                .iter()
+                .any(|f| f.side(side(f.body)) == Side::Outside)
+        };
+        for (t, term) in self.terms.iter().enumerate() {
+            if leaves_out(term) {
                 continue;
             }
-            let d = body.distance(point, within, limits[b]);
-            found(b, d);
-            if within {
-                depth = depth.max(d);
-            } else {
-                gap = gap.min(d);
+            let mut nearest = Measured {
+                distance: reaches.most,
+                by: None,
+            };
+            for f in &term.factors {
+                let (b, limit) = (f.body, nearest.distance);
+                let d = reaches.distance(&self.bodies[b], b, point, side(b), limit);
+                if d < limit {
+                    nearest = Measured {
+                        distance: d,
+                        by: Some((t, b)),
+                    };
+                }
+                if nearest.distance <= deepest.distance {
+                    break;
+                }
+            }
+            if nearest.distance > deepest.distance {
+                deepest = nearest;
             }
         }
-        if depth >= 0.0 {
-            // Adding 0 turns -0 into 0.
-            -depth + 0.0
-        } else if gap > 0.0 {
-            gap
-        } else {
-            // Outside and nearer than f64 can tell.
-            f64::from_bits(1)
-        }
+        deepest.distance = deepest.distance.max(0.0);
+        deepest
     }
-}
 
-/// How part `b`'s half-plane maps to part `a`'s: `r -> k r`, `z -> h z + d`; `None` where they do
-/// not share axis and turn.
-fn coaxial(a: &Part, b: &Part) -> Option<(Dd, Dd, Dd)> {
-    /// Agreement asked of unit vectors and of offsets relative to the larger part.
-    const SAME: f64 = 1e-27;
-    let (ea, eb) = (a.frame.axis_exact(2), b.frame.axis_exact(2));
-    let along = dot(ea, eb);
-    let up = along > Dd::ZERO;
-    let differs = |u: DdVec, v: DdVec| (0..3).any(|i| (u[i] - v[i]).abs().f64() > SAME);
-    if differs(ea, if up { eb } else { eb.map(|c| -c) }) {
-        return None;
-    }
-    let (oa, ob) = (a.frame.origin_exact(), b.frame.origin_exact());
-    let offset: DdVec = std::array::from_fn(|i| ob[i] - oa[i]);
-    let height = dot(offset, ea);
-    let scale = (a.frame.scale() + b.frame.scale()).max(a.frame.origin().abs().max_element());
-    if (0..3).any(|i| (offset[i] - height * ea[i]).abs().f64() > SAME * scale) {
-        return None;
-    }
-    let same_turn = match (&a.turn, &b.turn) {
-        (Turn::Full, Turn::Full) => true,
-        (Turn::Partial(s), Turn::Partial(t)) if up && s.degrees() == t.degrees() => {
-            let world = |p: &Part, d: [Dd; 2]| -> DdVec {
-                let (x, y) = (p.frame.axis_exact(0), p.frame.axis_exact(1));
-                std::array::from_fn(|i| x[i] * d[0] + y[i] * d[1])
+    fn gap(&self, point: DVec3, side: impl Fn(usize) -> Side, reaches: &mut Reaches) -> Measured {
+        let mut nearest = Measured {
+            distance: reaches.most,
+            by: None,
+        };
+        for (t, term) in self.terms.iter().enumerate() {
+            let mut widest = Measured {
+                distance: 0.0,
+                by: None,
             };
-            !differs(
-                world(a, s.directions_exact()[0]),
-                world(b, t.directions_exact()[0]),
-            )
+            for f in &term.factors {
+                let (b, limit) = (f.body, nearest.distance);
+                if f.side(side(b)) != Side::Outside {
+                    continue;
+                }
+                let d = reaches.distance(&self.bodies[b], b, point, side(b), limit);
+                if d >= widest.distance {
+                    widest = Measured {
+                        distance: d,
+                        by: Some((t, b)),
+                    };
+                }
+                if d >= limit {
+                    break;
+                }
+            }
+            if widest.distance < nearest.distance {
+                nearest = widest;
+            }
         }
-        _ => false,
-    };
-    if !same_turn {
-        return None;
+        nearest
     }
-    let k = b.frame.scale_exact() / a.frame.scale_exact();
-    Some((k, if up { k } else { -k }, height / a.frame.scale_exact()))
+
+    /// Whether a measured distance is the composite's own: the nearest point of what decided is on
+    /// the composite's boundary.
+    pub(crate) fn is_exact(
+        &self,
+        point: DVec3,
+        side: impl Fn(usize) -> Side,
+        inside: bool,
+        measured: Measured,
+    ) -> bool {
+        if self.single().is_some() || self.terms.is_empty() {
+            return true;
+        }
+        let Some((t, b)) = measured.by else {
+            return false;
+        };
+        let Some(foot) = self.bodies[b].foot(point, side(b) != Side::Outside) else {
+            return false;
+        };
+        // Room for the rounding of the foot: nearer to another surface nothing is concluded.
+        let clear =
+            1e-12 * self.bounds.longest_side() + 64.0 * f64::EPSILON * foot.abs().max_element();
+        let firmly = |f: &Factor, wanted: Side| {
+            let body = &self.bodies[f.body];
+            let side = body.side(foot);
+            f.side(side) == wanted && body.distance(foot, side == Side::Inside, clear) >= clear
+        };
+        if inside {
+            // No other term may cover the foot.
+            self.terms
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| *k != t)
+                .all(|(_, term)| term.factors.iter().any(|f| firmly(f, Side::Outside)))
+        } else {
+            // The rest of the term must hold the foot.
+            let others = self.terms[t].factors.iter().filter(|f| f.body != b);
+            others.into_iter().all(|f| firmly(f, Side::Inside))
+        }
+    }
 }
 
-/// The body of one part.
-fn alone(part: &Part) -> Body {
-    Body::new(
-        part.frame.clone(),
-        part.turn.clone(),
-        part.region.boundary().to_vec(),
-    )
-}
-
-/// The body of coaxial parts; `None` where they meet too often to be sorted out.
-fn joined(parts: &[Part], group: &[usize]) -> Option<Body> {
-    let host = &parts[group[0]];
-    if group.len() == 1 {
-        return Some(alone(host));
+/// The signed form of an unsigned distance.
+#[inline]
+pub(crate) fn signed(distance: f64, inside: bool) -> f64 {
+    if inside {
+        // Adding 0 turns -0 into 0.
+        -distance + 0.0
+    } else if distance > 0.0 {
+        // The distance to an empty solid has no bound.
+        distance.min(f64::MAX)
+    } else {
+        // Outside and nearer than f64 can tell.
+        f64::from_bits(1)
     }
-    // The largest part sets the unit, so that no coordinate leaves the unit square by much.
-    let host = group
-        .iter()
-        .map(|&i| &parts[i])
-        .max_by(|a, b| a.frame.scale().total_cmp(&b.frame.scale()))
-        .unwrap_or(host);
-    let mut pieces: Vec<Piece> = Vec::new();
-    let mut owner = Vec::new();
-    for (slot, &i) in group.iter().enumerate() {
-        let (k, h, d) = coaxial(host, &parts[i]).expect("parts of a group share their axis");
-        let region = &parts[i].region;
-        pieces.extend(region.boundary().iter().map(|b| b.piece.mapped(k, h, d)));
-        owner.resize(pieces.len(), slot);
-    }
-    // Each operand is the cleaned boundary of its own region, for which parity is membership.
-    let outcome = filled_boundary(
-        &pieces,
-        &|w| w.iter().any(|w| w.crossings % 2 == 1),
-        &|i| owner[i],
-        group.len(),
-        SAME_FACE,
-    );
-    (!outcome.pieces.is_empty())
-        .then(|| Body::new(host.frame.clone(), host.turn.clone(), outcome.pieces))
 }

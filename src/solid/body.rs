@@ -10,11 +10,16 @@
 //! ∂M leaves out the parts on the axis, which sweep no surface; the flat caps have them.
 
 use super::bounds;
+use super::row::RowSurface;
 use super::turn::{Turn, Wedge};
 use crate::math::quadrature::Integral;
+use crate::math::similarity::DdVec;
 use crate::math::{Aabb, Real, Similarity};
-use crate::region::{BoundaryPiece, Box2, BoxTree, ClosedSection, DistanceSet, filled_integral};
+use crate::region::{
+    BoundaryPiece, Box2, BoxTree, DistanceSet, MeridianPoint, Section, Side, filled_integral,
+};
 use glam::{DVec2, DVec3};
+use std::sync::Arc;
 
 /// The boundary of a solid of revolution in space.
 #[derive(Debug, Clone)]
@@ -22,36 +27,41 @@ pub struct Body {
     /// Local lengths are in the region's unit.
     frame: Similarity,
     turn: Turn,
+    section: Arc<Section>,
     boundary: Vec<BoundaryPiece>,
+    /// What the boundary sweeps.
     surface: DistanceSet,
-    section: DistanceSet,
-    closed: ClosedSection,
+    /// The edges of the caps: the boundary with its parts on the axis.
+    edges: DistanceSet,
     tree: BoxTree,
     bounds: Aabb,
+    /// Far wider than any rounding of the bounds, far narrower than the solid.
+    margin: f64,
 }
 
 impl Body {
-    pub(crate) fn new(frame: Similarity, turn: Turn, boundary: Vec<BoundaryPiece>) -> Self {
-        let surface = DistanceSet::new(
-            boundary
-                .iter()
-                .filter(|p| !p.piece.on_axis)
-                .map(|p| &p.piece),
-        );
-        let section = DistanceSet::new(boundary.iter().map(|p| &p.piece));
+    /// A turned section with its boundary, in a frame whose local lengths are in the section's unit.
+    pub(crate) fn new(
+        frame: Similarity,
+        turn: Turn,
+        section: Arc<Section>,
+        boundary: Vec<BoundaryPiece>,
+    ) -> Self {
+        let swept = boundary.iter().filter(|p| !p.piece.on_axis);
+        let surface = DistanceSet::new(swept.map(|p| &p.piece));
+        let edges = DistanceSet::new(boundary.iter().map(|p| &p.piece));
         let bounds = bounds::bounds(&frame, &turn, &boundary);
-        let closed = ClosedSection::new(boundary.iter().map(|b| b.piece.clone()).collect());
         let boxes: Vec<Box2> = boundary.iter().map(|b| b.piece.bounds).collect();
-        let tree = BoxTree::new(&boxes);
         Self {
             frame,
             turn,
-            boundary,
-            surface,
             section,
-            closed,
-            tree,
+            surface,
+            edges,
+            tree: BoxTree::new(&boxes),
+            boundary,
             bounds,
+            margin: 1e-9 * bounds.longest_side(),
         }
     }
 
@@ -69,6 +79,66 @@ impl Body {
 
     pub(crate) fn frame(&self) -> &Similarity {
         &self.frame
+    }
+
+    /// The body as rows of voxels see it.
+    pub(crate) fn rows(&self) -> RowSurface<'_> {
+        RowSurface {
+            frame: &self.frame,
+            turn: &self.turn,
+            pieces: self.section.pieces(),
+            tree: self.section.tree(),
+        }
+    }
+
+    /// Which side of the body's surface a point is on.
+    #[must_use]
+    #[inline]
+    pub fn side(&self, point: DVec3) -> Side {
+        let margin = self.margin + 64.0 * f64::EPSILON * point.abs().max_element();
+        if !(point.cmpge(self.bounds.min - margin).all()
+            && point.cmple(self.bounds.max + margin).all())
+        {
+            return Side::Outside;
+        }
+        let local = self.frame.to_local(point);
+        let p = local.point;
+        let flat = DVec2::new(p.x, p.y);
+        let flat_error = local.error.x + local.error.y;
+        // One exact transformation serves both questions.
+        let mut exact: Option<DdVec> = None;
+        let mut turned = Side::Inside;
+        if let Turn::Partial(wedge) = &self.turn {
+            turned = match wedge.contains(flat, flat_error) {
+                Some(true) => Side::Inside,
+                Some(false) => Side::Outside,
+                None => {
+                    let e = *exact.get_or_insert_with(|| self.frame.to_local_exact(point));
+                    wedge.side_exact([e[0], e[1]])
+                }
+            };
+            if turned == Side::Outside {
+                return turned;
+            }
+        }
+        let rho = flat.x.hypot(flat.y);
+        let meridian = MeridianPoint {
+            r: rho,
+            z: p.z,
+            r_error: flat_error + 4.0 * f64::EPSILON * rho,
+            z_error: local.error.z,
+        };
+        let side = self.section.side(meridian, || {
+            let e = exact.unwrap_or_else(|| self.frame.to_local_exact(point));
+            [(e[0] * e[0] + e[1] * e[1]).sqrt(), e[2]]
+        });
+        side.min(turned)
+    }
+
+    /// Whether the closed body holds the point.
+    #[must_use]
+    pub fn contains(&self, point: DVec3) -> bool {
+        self.side(point) != Side::Outside
     }
 
     /// Coordinates along a grid axis of the flat faces normal to it, where the solid's axis is
@@ -123,16 +193,53 @@ impl Body {
             if across >= best {
                 continue;
             }
-            let in_section = along >= 0.0 && self.closed.contains(along, p.z);
+            let in_section = along >= 0.0 && self.section.side_of(along, p.z) != Side::Outside;
             let distance = if in_section {
                 across
             } else {
                 let room = (best * best - across * across).sqrt();
-                across.hypot(self.section.distance([along, p.z], room))
+                across.hypot(self.edges.distance([along, p.z], room))
             };
             best = best.min(distance);
         }
         best
+    }
+
+    /// The nearest point of the solid's surface, in scene units.
+    pub(crate) fn foot(&self, point: DVec3, inside: bool) -> Option<DVec3> {
+        let p = self.frame.to_local(point).point;
+        if !(p.abs().max_element() < 1e90) {
+            return None;
+        }
+        let flat = DVec2::new(p.x, p.y);
+        let rho = flat.length();
+        // Any half-plane holds the axis.
+        let own = if rho > 0.0 { flat / rho } else { DVec2::X };
+        let local = |along: DVec2, [r, z]: [f64; 2]| DVec3::new(along.x * r, along.y * r, z);
+        let mut best: Option<(f64, DVec3)> = None;
+        let mut offer = |distance: f64, at: DVec3| {
+            if best.is_none_or(|(d, _)| distance < d) {
+                best = Some((distance, at));
+            }
+        };
+        let wedge = match &self.turn {
+            Turn::Full => None,
+            Turn::Partial(wedge) => Some(wedge),
+        };
+        if wedge.is_none_or(|w| inside || w.contains(flat, 0.0).unwrap_or(true))
+            && let Some((d, at)) = self.surface.nearest([rho, p.z])
+        {
+            offer(d, local(own, at));
+        }
+        for d in wedge.iter().flat_map(|w| w.directions()) {
+            let (along, across) = (flat.dot(d), flat.perp_dot(d).abs());
+            if along >= 0.0 && self.section.side_of(along, p.z) != Side::Outside {
+                offer(across, local(d, [along, p.z]));
+            } else if let Some((off, at)) = self.edges.nearest([along, p.z]) {
+                offer(across.hypot(off), local(d, at));
+            }
+        }
+        best.map(|(_, at)| self.frame.to_world(at))
     }
 
     /// Calls `each` with the boundary pieces that reach heights between `low` and `high` at a

@@ -12,7 +12,7 @@
 use super::turn::Turn;
 use crate::math::bernstein::{self, Coefficients};
 use crate::math::{Aabb, Dd, Real, Similarity};
-use crate::region::BoundaryPiece;
+use crate::region::{BoundaryPiece, Side};
 use glam::DVec3;
 
 pub(super) fn bounds(frame: &Similarity, turn: &Turn, boundary: &[BoundaryPiece]) -> Aabb {
@@ -43,7 +43,7 @@ fn largest_over_turn(turn: &Turn, v: [Dd; 2]) -> Dd {
     match turn {
         Turn::Full => length,
         Turn::Partial(wedge) => {
-            if wedge.contains_exact(v) && length > Dd::ZERO {
+            if wedge.side_exact(v) != Side::Outside && length > Dd::ZERO {
                 return length;
             }
             let [s, e] = wedge.directions_exact().map(|d| d[0] * v[0] + d[1] * v[1]);

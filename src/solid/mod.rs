@@ -7,13 +7,19 @@
 mod assembly;
 mod body;
 mod bounds;
+mod coaxial;
 mod fraction;
+mod part;
 mod row;
+mod terms;
 mod turn;
 
-pub use assembly::{Assembly, Part};
+pub use assembly::Assembly;
 pub use body::Body;
+pub use part::{Operation, Part};
 pub use turn::Turn;
 
+pub(crate) use assembly::{Reaches, signed};
 pub(crate) use fraction::{CellShape, TOLERANCE};
 pub(crate) use row::{Cuts, LayerCuts, Row};
+pub(crate) use terms::{Factor, Term};

@@ -2,6 +2,7 @@
 
 use crate::math::tolerance::{ON_BOUNDARY, U};
 use crate::math::{Dd, Real};
+use crate::region::Side;
 use glam::DVec2;
 
 /// A full turn, or the wedge between two half-planes.
@@ -119,13 +120,18 @@ impl Wedge {
         Some(self.combine(a > 0.0, b > 0.0))
     }
 
-    /// Whether the closed wedge holds a point; one met by a cap is inside.
-    pub(crate) fn contains_exact(&self, p: [Dd; 2]) -> bool {
+    /// The side of a point; a cap's plane is met to within double-double.
+    pub(crate) fn side_exact(&self, p: [Dd; 2]) -> Side {
         let cross = |a: [Dd; 2], b: [Dd; 2]| a[0] * b[1] - a[1] * b[0];
-        let not_negative = |v: Dd| v.f64() >= -ON_BOUNDARY;
-        self.combine(
-            not_negative(cross(self.start, p)),
-            not_negative(cross(p, self.end)),
-        )
+        let half_plane = |v: Dd| match v.f64() {
+            v if v.abs() <= ON_BOUNDARY => Side::On,
+            v if v > 0.0 => Side::Inside,
+            _ => Side::Outside,
+        };
+        let (a, b) = (
+            half_plane(cross(self.start, p)),
+            half_plane(cross(p, self.end)),
+        );
+        if self.is_reflex() { a.max(b) } else { a.min(b) }
     }
 }

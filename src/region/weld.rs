@@ -1,0 +1,120 @@
+//! Closing a boundary to the last bit.
+//!
+//! Counting crossings is right for every height only where the ends of pieces meet exactly: each
+//! vertex must belong to an even number of ends. Pieces of several solids meet within roundings,
+//! so their ends are brought together here, and what does not close is told.
+
+use super::boundary::BoundaryPiece;
+use super::piece::Piece;
+use super::tree::Box2;
+use crate::math::{Dd, Real};
+
+/// Ends nearer than this, in the region's unit, are brought together where that leaves no end
+/// alone: along curves that touch, the place where one takes over from the other is known no
+/// better.
+const LOOSE: f64 = 1e-13;
+
+/// Sets of vertices, as a forest.
+struct Clusters(Vec<usize>);
+
+impl Clusters {
+    fn root(&mut self, mut i: usize) -> usize {
+        while self.0[i] != i {
+            self.0[i] = self.0[self.0[i]];
+            i = self.0[i];
+        }
+        i
+    }
+
+    fn join(&mut self, i: usize, j: usize) {
+        let (a, b) = (self.root(i), self.root(j));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+/// Brings ends nearer than `tolerance` together; `None` where the pieces then do not close.
+pub(crate) fn welded(boundary: Vec<BoundaryPiece>, tolerance: f64) -> Option<Vec<BoundaryPiece>> {
+    let ends: Vec<[Dd; 2]> = boundary
+        .iter()
+        .flat_map(|b| [b.piece.start, b.piece.end])
+        .collect();
+    // In this order the first of a cluster has its least r: 0 stays 0.
+    let mut order: Vec<usize> = (0..ends.len()).collect();
+    let key = |i: usize| ends[i].map(Real::f64);
+    order.sort_by(|&i, &j| key(i)[1].total_cmp(&key(j)[1]).then(i.cmp(&j)));
+    let mut clusters = Clusters((0..ends.len()).collect());
+    join_near(&ends, &order, tolerance, &mut clusters);
+    let odd = odd_vertices(&boundary, &mut clusters);
+    if !odd.is_empty() {
+        let lonely: Vec<usize> = order.iter().copied().filter(|i| odd.contains(i)).collect();
+        join_near(&ends, &lonely, LOOSE, &mut clusters);
+        if !odd_vertices(&boundary, &mut clusters).is_empty() {
+            return None;
+        }
+    }
+    let mut place: Vec<Option<[Dd; 2]>> = vec![None; ends.len()];
+    for (i, end) in ends.iter().enumerate() {
+        let at = &mut place[clusters.root(i)];
+        if at.is_none_or(|p| end[0] < p[0]) {
+            *at = Some(*end);
+        }
+    }
+    let mut at = |i: usize| place[clusters.root(i)].unwrap_or(ends[i]);
+    let moved = boundary.into_iter().enumerate();
+    Some(
+        moved
+            .filter_map(|(k, b)| {
+                Some(BoundaryPiece {
+                    piece: between(b.piece, at(2 * k), at(2 * k + 1))?,
+                    forward: b.forward,
+                })
+            })
+            .collect(),
+    )
+}
+
+/// Joins the points of `order`, which rises in z, that are nearer than `tolerance`.
+fn join_near(ends: &[[Dd; 2]], order: &[usize], tolerance: f64, clusters: &mut Clusters) {
+    for (n, &i) in order.iter().enumerate() {
+        for &j in &order[n + 1..] {
+            if (ends[j][1] - ends[i][1]).f64() > tolerance {
+                break;
+            }
+            if (ends[j][0] - ends[i][0]).f64().abs() <= tolerance {
+                clusters.join(i, j);
+            }
+        }
+    }
+}
+
+/// Roots of the clusters that an odd number of ends belong to.
+fn odd_vertices(
+    boundary: &[BoundaryPiece],
+    clusters: &mut Clusters,
+) -> std::collections::BTreeSet<usize> {
+    let mut odd = std::collections::BTreeSet::new();
+    for k in 0..2 * boundary.len() {
+        let root = clusters.root(k);
+        if !odd.remove(&root) {
+            odd.insert(root);
+        }
+    }
+    odd
+}
+
+/// The piece with its ends moved by a rounding; `None` where nothing is left of it.
+fn between(mut piece: Piece, start: [Dd; 2], end: [Dd; 2]) -> Option<Piece> {
+    if start == end {
+        return None;
+    }
+    if start == piece.start && end == piece.end {
+        return Some(piece);
+    }
+    if piece.degree() == 1 {
+        return Some(Piece::segment(start, end, piece.loop_index));
+    }
+    piece.start = start;
+    piece.end = end;
+    piece.bounds = Box2::around(start.map(Real::f64), end.map(Real::f64));
+    Some(piece)
+}

@@ -1,0 +1,69 @@
+//! What is counted while layers are sampled.
+
+use std::collections::BTreeMap;
+
+/// Counts over voxels.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Tally {
+    /// How exact the distances are.
+    pub certainty: Certainty,
+    /// Voxels of each material id, those of none left out.
+    pub materials: BTreeMap<u32, u64>,
+}
+
+/// How many distances, those clamped to the band left out, are exact and how many lower bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Certainty {
+    /// Distances that are exact.
+    pub exact: u64,
+    /// Distances that are lower bounds of the true ones.
+    pub lower_bound: u64,
+    /// Of the exact ones, those of at most three voxels of the largest spacing.
+    pub exact_near: u64,
+    /// Of the lower bounds, those of at most three voxels of the largest spacing.
+    pub lower_bound_near: u64,
+}
+
+impl Tally {
+    /// Adds another count.
+    pub fn add(&mut self, other: &Self) {
+        let (a, b) = (&mut self.certainty, &other.certainty);
+        a.exact += b.exact;
+        a.lower_bound += b.lower_bound;
+        a.exact_near += b.exact_near;
+        a.lower_bound_near += b.lower_bound_near;
+        for (&material, &voxels) in &other.materials {
+            *self.materials.entry(material).or_default() += voxels;
+        }
+    }
+
+    pub(super) fn count_materials(&mut self, row: &[u32]) {
+        for run in row.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
+            *self.materials.entry(run[0]).or_default() += run.len() as u64;
+        }
+    }
+}
+
+impl Certainty {
+    pub(super) fn count(&mut self, exact: bool, near: bool) {
+        let (all, close) = if exact {
+            (&mut self.exact, &mut self.exact_near)
+        } else {
+            (&mut self.lower_bound, &mut self.lower_bound_near)
+        };
+        *all += 1;
+        *close += u64::from(near);
+    }
+
+    /// Share of the distances of at most three voxels that are exact; 1 where there are none.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
+    pub fn exact_share_near(&self) -> f64 {
+        let all = self.exact_near + self.lower_bound_near;
+        if all == 0 {
+            1.0
+        } else {
+            self.exact_near as f64 / all as f64
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! One solid of a scene by itself.
+
+use super::body::Body;
+use super::turn::Turn;
+use crate::math::quadrature::Integral;
+use crate::math::{Aabb, Similarity};
+use crate::region::Region;
+use glam::DVec3;
+use std::sync::Arc;
+
+/// What a solid does with what the solids before it have made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Operation {
+    /// Joins it.
+    #[default]
+    Add,
+    /// Takes itself away.
+    Subtract,
+    /// Leaves only what it holds itself.
+    Intersect,
+}
+
+/// One turned and placed region, and what it does to the solids before it.
+#[derive(Debug, Clone)]
+pub struct Part {
+    name: String,
+    material: u32,
+    operation: Operation,
+    region: Arc<Region>,
+    body: Arc<Body>,
+}
+
+impl Part {
+    /// A region turned about the third axis of `frame` (local lengths in scene units), to be added.
+    #[must_use]
+    pub fn new(
+        name: String,
+        material: u32,
+        region: Arc<Region>,
+        frame: &Similarity,
+        turn: Turn,
+    ) -> Self {
+        let frame = frame.with_local_unit(region.unit());
+        let (section, boundary) = (region.section().clone(), region.boundary().to_vec());
+        Self {
+            name,
+            material,
+            operation: Operation::Add,
+            region,
+            body: Arc::new(Body::new(frame, turn, section, boundary)),
+        }
+    }
+
+    /// The part with another operation.
+    #[must_use]
+    pub fn with_operation(self, operation: Operation) -> Self {
+        Self { operation, ..self }
+    }
+
+    /// The part's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The part's material id.
+    #[must_use]
+    pub fn material(&self) -> u32 {
+        self.material
+    }
+
+    /// What the part does to those before it.
+    #[must_use]
+    pub fn operation(&self) -> Operation {
+        self.operation
+    }
+
+    /// The part's solid.
+    #[must_use]
+    pub fn body(&self) -> &Arc<Body> {
+        &self.body
+    }
+
+    pub(crate) fn region(&self) -> &Region {
+        &self.region
+    }
+
+    /// The smallest box around the part, in scene units.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.body.bounds()
+    }
+
+    /// The part's volume, in cubed scene units, with an estimate of its error.
+    #[must_use]
+    pub fn volume(&self) -> Integral {
+        self.body.volume()
+    }
+
+    /// What a user should know about the part's profile.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        self.region.warnings()
+    }
+
+    /// Whether the closed part holds the point.
+    #[must_use]
+    pub fn contains(&self, point: DVec3) -> bool {
+        self.body.contains(point)
+    }
+}
