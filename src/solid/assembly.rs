@@ -10,7 +10,7 @@ use super::row::RowSurface;
 use super::turn::Turn;
 use crate::math::similarity::{DdVec, dot};
 use crate::math::{Aabb, Dd, Real, Similarity};
-use crate::region::{MeridianPoint, Piece, Region, SAME_FACE, filled_boundary};
+use crate::region::{BoundaryPiece, MeridianPoint, Piece, Region, SAME_FACE, filled_boundary};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
@@ -27,7 +27,6 @@ pub struct Part {
     margin: f64,
     /// Index of the body whose boundary includes the part's.
     body: usize,
-    volume: crate::math::quadrature::Integral,
 }
 
 /// Parts joined into one solid.
@@ -53,7 +52,6 @@ impl Part {
         let bounds = body.bounds();
         // Far wider than any rounding of the bounds, far narrower than the solid.
         let margin = 1e-9 * bounds.longest_side();
-        let volume = body.volume();
         Self {
             name,
             material,
@@ -63,7 +61,6 @@ impl Part {
             bounds,
             margin,
             body: 0,
-            volume,
         }
     }
 
@@ -85,14 +82,13 @@ impl Part {
         self.bounds
     }
 
-    /// The part's volume, in cubed scene units, with an estimate of its error.
-    #[must_use]
-    pub fn volume(&self) -> crate::math::quadrature::Integral {
-        self.volume
-    }
-
     pub(crate) fn body(&self) -> usize {
         self.body
+    }
+
+    /// The frame, the turn and the pieces around the turned region.
+    pub(super) fn shape(&self) -> (&Similarity, &Turn, &[BoundaryPiece]) {
+        (&self.frame, &self.turn, self.region.boundary())
     }
 
     /// The part as rows of voxels see it.

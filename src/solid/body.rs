@@ -1,4 +1,4 @@
-//! A turned region: distance, bounds and volume.
+//! A turned region: distance and bounds.
 //!
 //! ```text
 //!   full turn     sdf(X) = ± dist((ρ, z), ∂M)                     M the meridian region
@@ -11,9 +11,8 @@
 
 use super::bounds;
 use super::turn::{Turn, Wedge};
-use crate::math::quadrature::Integral;
 use crate::math::{Aabb, Real, Similarity};
-use crate::region::{BoundaryPiece, Box2, BoxTree, ClosedSection, DistanceSet, filled_integral};
+use crate::region::{BoundaryPiece, Box2, BoxTree, ClosedSection, DistanceSet};
 use glam::{DVec2, DVec3};
 
 /// The boundary of a solid of revolution in space.
@@ -69,6 +68,11 @@ impl Body {
 
     pub(crate) fn frame(&self) -> &Similarity {
         &self.frame
+    }
+
+    /// The pieces around the turned region, in its unit.
+    pub(super) fn boundary(&self) -> &[BoundaryPiece] {
+        &self.boundary
     }
 
     /// Coordinates along a grid axis of the flat faces normal to it, where the solid's axis is
@@ -151,17 +155,6 @@ impl Body {
                 each(part);
             }
         });
-    }
-
-    /// Volume in cubed scene units, with an estimate of its error.
-    #[must_use]
-    pub fn volume(&self) -> Integral {
-        let ring = filled_integral(&self.boundary);
-        let factor = 0.5 * self.turn.radians() * self.frame.scale().powi(3);
-        Integral {
-            value: ring.value * factor,
-            error: ring.error * factor,
-        }
     }
 }
 

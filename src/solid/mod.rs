@@ -8,11 +8,14 @@ mod assembly;
 mod body;
 mod bounds;
 mod fraction;
+mod measure;
 mod row;
 mod turn;
+mod turned;
 
 pub use assembly::{Assembly, Part};
 pub use body::Body;
+pub use measure::{MeasureErrors, Measures, Moments};
 pub use turn::Turn;
 
 pub(crate) use fraction::{CellShape, TOLERANCE};
