@@ -3,6 +3,7 @@
 pub mod bernstein;
 pub mod dd;
 pub mod disc;
+pub mod gauss;
 pub mod quadrature;
 pub mod similarity;
 pub mod tolerance;

@@ -8,7 +8,7 @@
 //! ```text
 //!   curves ──> pieces ──┬──> crossings   is a point of the half-plane inside?
 //!                       └──> boundary ──┬──> distance    how far is it?
-//!                                       └──> integrals   how much is it?
+//!                                       └──> moments     how much is it?
 //! ```
 
 mod boundary;
@@ -16,7 +16,7 @@ mod crossings;
 mod curve;
 mod distance;
 mod error;
-mod integrals;
+mod moments;
 mod piece;
 mod profile;
 mod section;
@@ -32,7 +32,7 @@ pub use section::Side;
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
 pub(crate) use crossings::MeridianPoint;
-pub(crate) use integrals::r_squared_dz as filled_integral;
+pub(crate) use moments::{Estimate, SectionMoments};
 pub(crate) use piece::Piece;
 pub(crate) use section::Section;
 pub(crate) use tree::{Box2, BoxTree};

@@ -1,4 +1,4 @@
-//! A turned region: distance, bounds and volume.
+//! A turned region: distance and bounds.
 //!
 //! ```text
 //!   full turn     sdf(X) = ± dist((ρ, z), ∂M)                     M the meridian region
@@ -12,12 +12,9 @@
 use super::bounds;
 use super::row::RowSurface;
 use super::turn::{Turn, Wedge};
-use crate::math::quadrature::Integral;
 use crate::math::similarity::DdVec;
 use crate::math::{Aabb, Real, Similarity};
-use crate::region::{
-    BoundaryPiece, Box2, BoxTree, DistanceSet, MeridianPoint, Section, Side, filled_integral,
-};
+use crate::region::{BoundaryPiece, Box2, BoxTree, DistanceSet, MeridianPoint, Section, Side};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
@@ -141,6 +138,11 @@ impl Body {
         self.side(point) != Side::Outside
     }
 
+    /// The pieces around the turned region, in its unit.
+    pub(super) fn boundary(&self) -> &[BoundaryPiece] {
+        &self.boundary
+    }
+
     /// Coordinates along a grid axis of the flat faces normal to it, where the solid's axis is
     /// parallel to that grid axis.
     pub(crate) fn flat_faces(&self, axis: usize) -> Vec<f64> {
@@ -258,17 +260,6 @@ impl Body {
                 each(part);
             }
         });
-    }
-
-    /// Volume in cubed scene units, with an estimate of its error.
-    #[must_use]
-    pub fn volume(&self) -> Integral {
-        let ring = filled_integral(&self.boundary);
-        let factor = 0.5 * self.turn.radians() * self.frame.scale().powi(3);
-        Integral {
-            value: ring.value * factor,
-            error: ring.error * factor,
-        }
     }
 }
 

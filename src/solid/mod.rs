@@ -8,14 +8,18 @@ mod assembly;
 mod body;
 mod bounds;
 mod coaxial;
+mod composite;
 mod fraction;
+mod measure;
 mod part;
 mod row;
 mod terms;
 mod turn;
+mod turned;
 
 pub use assembly::Assembly;
 pub use body::Body;
+pub use measure::{MeasureErrors, Measures, Moments};
 pub use part::{Operation, Part};
 pub use turn::Turn;
 

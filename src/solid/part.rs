@@ -2,7 +2,6 @@
 
 use super::body::Body;
 use super::turn::Turn;
-use crate::math::quadrature::Integral;
 use crate::math::{Aabb, Similarity};
 use crate::region::Region;
 use glam::DVec3;
@@ -89,12 +88,6 @@ impl Part {
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.body.bounds()
-    }
-
-    /// The part's volume, in cubed scene units, with an estimate of its error.
-    #[must_use]
-    pub fn volume(&self) -> Integral {
-        self.body.volume()
     }
 
     /// What a user should know about the part's profile.

@@ -63,6 +63,26 @@ impl Turn {
     }
 }
 
+impl Turn {
+    /// Half the angle turned in radians, its sine and its cosine.
+    pub(super) fn half(&self) -> (Dd, Dd, Dd) {
+        let half = Dd::of(0.5 * self.degrees());
+        let (sin, cos) = half.sin_cos_degrees();
+        (half * Dd::PI / Dd::of(180.0), sin, cos)
+    }
+
+    /// The direction in the middle of the turn.
+    pub(super) fn middle(&self) -> [Dd; 2] {
+        match self {
+            Self::Full => [Dd::ONE, Dd::ZERO],
+            Self::Partial(w) => {
+                let (s, c) = Dd::sum(w.from, 0.5 * w.degrees).sin_cos_degrees();
+                [c, s]
+            }
+        }
+    }
+}
+
 impl Wedge {
     /// The angle turned, in degrees.
     #[must_use]
