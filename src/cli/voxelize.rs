@@ -440,7 +440,7 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<Value> {
         #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
         let volume = sampled.map(|n| n as f64 * voxel);
         let part = scene.assembly().of_material(id);
-        let exact = part.and_then(|m| Some(m.single()?.volume().value));
+        let exact = part.and_then(|m| Some(m.moments()?.volume.value));
         json!({
             "id": id,
             "name": scene.model().materials.get(&id),

@@ -13,7 +13,7 @@ use crate::solid::{Assembly, Operation, Part, Turn};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A scene made ready: its solid, and the grid it asks for.
 ///
@@ -35,6 +35,7 @@ use std::sync::Arc;
 pub struct Scene {
     model: SceneModel,
     assembly: Assembly,
+    volume: OnceLock<Option<f64>>,
     warnings: Vec<String>,
 }
 
@@ -104,6 +105,7 @@ impl Scene {
         }
         Ok(Self {
             assembly: Assembly::new(parts),
+            volume: OnceLock::new(),
             model,
             warnings,
         })
@@ -144,10 +146,12 @@ impl Scene {
         &self.warnings
     }
 
-    /// The exact volume in cubed scene units, where all solids make one body.
+    /// The volume of the composite in cubed scene units, computed once; `None` where that is too
+    /// much work.
     #[must_use]
     pub fn exact_volume(&self) -> Option<f64> {
-        self.assembly.single().map(|one| one.volume().value)
+        let volume = || Some(self.assembly.moments()?.volume.value);
+        *self.volume.get_or_init(volume)
     }
 
     /// BLAKE3 of the resolved scene, in hexadecimal.
