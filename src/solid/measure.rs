@@ -200,7 +200,8 @@ impl Moments {
 /// The inertia tensor of second moments about its point, with the Frobenius norm of its error.
 fn inertia(second: &[[Integral; 3]; 3]) -> ([[f64; 3]; 3], f64) {
     let negative = |m: Integral| Integral {
-        value: -m.value,
+        // Not -0 where there is nothing.
+        value: 0.0 - m.value,
         error: m.error,
     };
     let tensor: [[Integral; 3]; 3] = std::array::from_fn(|i| {
