@@ -15,7 +15,9 @@
 //! any integral is multiplied. Then it moves to the centroid, all in double-double, and is rounded
 //! once.
 //!
-//! * Source: design notes "Line integrals"; the table of closed forms there is what the tests hold.
+//! * Units: the region's, until [`Ring::placed`] makes them the scene's.
+//! * Source: ∭ f = ∬ r ∫ f dφ dr dz with ξ = r cos φ, η = r sin φ, |φ| <= h; ∫ dφ = k₀, ∫ cos φ = k₁,
+//!   ∫ cos² φ = k₂, ∫ sin² φ = k₃. The tests hold cylinder, cone, sphere, hemisphere and torus.
 
 use super::assembly::{Assembly, Part};
 use super::body::Body;
