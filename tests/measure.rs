@@ -311,7 +311,7 @@ fn crossing_loops_and_joined_solids_agree_with_closed_forms() {
             "curves = [{{ kind = 'polyline', points = [[{r:?}, {from:?}], [{r:?}, {to:?}]] }}]\n"
         )
     };
-    let joined = |profiles: [String; 2], keys: &str| {
+    let joined = |profiles: [String; 2], keys: &[String; 2]| {
         let mut text = String::from("schema = 1\n");
         for (i, p) in profiles.iter().enumerate() {
             write!(text, "[profiles.p{i}]\nboundary = 'to-axis'\n{p}").expect("text");
@@ -319,19 +319,57 @@ fn crossing_loops_and_joined_solids_agree_with_closed_forms() {
         for i in 0..2 {
             write!(
                 text,
-                "[[solid]]\nkind = 'revolve'\nprofile = 'p{i}'\n{keys}\n"
+                "[[solid]]\nkind = 'revolve'\nprofile = 'p{i}'\n{}\n",
+                keys[i]
             )
             .expect("text");
         }
         Scene::parse(&text).unwrap_or_else(|e| panic!("{e}\n{text}"))
     };
+    let plain = [String::new(), String::new()];
     let ball = "curves = [{ kind = 'arc', center = [0, 0], radius = 1, from = -90, to = 90 }]\n"
         .to_owned();
     // A ball with a rod of half its radius from the centre to twice the radius.
     let s = 0.75_f64.sqrt();
     let cap = PI * (1.0 - s) * (1.0 - s) * (2.0 + s) / 3.0;
     let rod = PI * 0.25 * (2.0 - s);
+    let half_ball =
+        "curves = [{ kind = 'arc', center = [0, 0], radius = 1, from = 0, to = 90 }]\n".to_owned();
+    let tilted = "place = [{ rotate = { axis = [1, 0, 0], degrees = SIDE } }, \
+                  { rotate = { axis = [1, 2, 3], degrees = 31 } }, { translate = [0.1, 0.2, 0.7] }]";
+    let sides = ["180", "0"].map(|side| tilted.replace("SIDE", side));
+    let two_halves = joined([half_ball.clone(), half_ball], &sides);
+    let square = |from: f64, to: f64, low: f64, high: f64| {
+        format!(
+            "[{{ kind = 'polyline', points = [[{from:?}, {low:?}], [{to:?}, {low:?}], [{to:?}, {high:?}], \
+             [{from:?}, {high:?}], [{from:?}, {low:?}]] }}]"
+        )
+    };
     for (name, scene, volume, area) in [
+        (
+            "circles that touch from within",
+            solid(
+                "loops = [[{ kind = 'circle', center = [2, 0], radius = 1 }], \
+                 [{ kind = 'circle', center = [2.7, 0], radius = 0.3 }]]",
+                "",
+            ),
+            2.0 * PI * (2.0 * PI - 0.09 * PI * 2.7),
+            2.0 * PI * (4.0 * PI + 2.7 * PI * 0.6),
+        ),
+        (
+            "squares that share part of an edge",
+            solid(
+                &format!(
+                    "loops = [{}, {}]",
+                    square(1.0, 2.0, 0.0, 1.0),
+                    square(2.0, 3.0, 0.3, 0.7)
+                ),
+                "",
+            ),
+            PI * (3.0 + 0.4 * 5.0),
+            2.0 * PI * (3.0 + 1.0 + 2.0 * 0.6 + 5.0 + 3.0 * 0.4),
+        ),
+        ("hemispheres, tilted", two_halves, 4.0 * PI / 3.0, 4.0 * PI),
         (
             "figure of eight",
             solid(
@@ -355,7 +393,10 @@ fn crossing_loops_and_joined_solids_agree_with_closed_forms() {
         ),
         (
             "cylinders whose faces differ by a rounding",
-            joined([cylinder(1.0, 0.0, 0.1 + 0.2), cylinder(1.0, 0.3, 1.0)], ""),
+            joined(
+                [cylinder(1.0, 0.0, 0.1 + 0.2), cylinder(1.0, 0.3, 1.0)],
+                &plain,
+            ),
             PI,
             4.0 * PI,
         ),
@@ -363,14 +404,14 @@ fn crossing_loops_and_joined_solids_agree_with_closed_forms() {
             "cylinders of two radii, half a turn",
             joined(
                 [cylinder(1.0, 0.0, 0.7), cylinder(0.3, 0.7, 1.1)],
-                "angle = 180",
+                &["angle = 180"; 2].map(String::from),
             ),
             0.5 * PI * (0.7 + 0.09 * 0.4),
             0.5 * (2.0 * PI + 2.0 * PI * (0.7 + 0.3 * 0.4)) + 2.0 * 0.7 + 2.0 * 0.3 * 0.4,
         ),
         (
             "a ball and a rod",
-            joined([ball, cylinder(0.5, 0.0, 2.0)], ""),
+            joined([ball, cylinder(0.5, 0.0, 2.0)], &plain),
             4.0 * PI / 3.0 - cap + rod,
             4.0 * PI - 2.0 * PI * (1.0 - s) + PI * (2.0 - s) + PI * 0.25,
         ),
