@@ -175,7 +175,7 @@ fn over_faces(
         key(a).cmp(&key(b)).then(a.range[0].total_cmp(&b.range[0]))
     });
     let moments = moments(&totals(&panels, &faces), centre);
-    let bounds = if with_bounds && moments.volume.value > 0.0 {
+    let bounds = if with_bounds && moments.area.value > 0.0 {
         extremes(&faces, &panels, centre, size)
     } else {
         None
@@ -278,12 +278,12 @@ fn moments(total: &[Integral; QUANTITIES], centre: DVec3) -> Moments {
         (1, 2) => total[PRODUCTS + 1],
         _ => total[PRODUCTS + 2],
     };
-    let volume = total[VOLUME];
-    if !(volume.value > volume.error) {
-        return Moments {
-            about: centre,
-            ..Moments::EMPTY
-        };
+    let volume = Integral {
+        value: total[VOLUME].value.max(0.0),
+        ..total[VOLUME]
+    };
+    if total[AREA].value == 0.0 {
+        return Moments::EMPTY;
     }
     Moments {
         about: centre,
