@@ -1,10 +1,13 @@
-//! Scenes of published parts against their exact figures.
+//! Scenes of real parts against figures known from elsewhere.
+
+use std::f64::consts::PI;
 
 use glam::DVec3;
 use voxlathe::Scene;
 use voxlathe::math::Aabb;
+use voxlathe::sample;
 
-/// What is known of a part: figures computed independently of this library, from the same f64 control
+/// What is known of a published part: figures computed independently of this library, from the same f64 control
 /// points, weights and knots, in arithmetic of more than 25 digits.
 struct Known {
     name: &'static str,
@@ -119,4 +122,95 @@ fn tokamak() {
             max: DVec3::new(8.199_999_999_999_998, 8.199_999_999_999_998, 3.7),
         }],
     );
+}
+
+/// Parts of one axis, whose volumes have closed forms: see the comments the scenes open with.
+#[test]
+fn closed_forms() {
+    let load = |name: &str| Scene::load(format!("scenes/{name}.toml")).expect("a shipped scene");
+    let square = |r: f64| r * r;
+    // A ball of radius `ball` reaches this far beyond the circle of radius 12.7 on it.
+    let cap = |ball: f64| {
+        let h = square(12.7) / (ball + (square(ball) - square(12.7)).sqrt());
+        (h, PI * h * h * (ball - h / 3.0))
+    };
+    let ((front, front_cap), (back, back_cap)) = (cap(60.0), cap(90.0));
+    let rings =
+        6.0 * (square(2.5) - square(2.3)) + 5.8 * (square(1.5) - square(1.3)) + 5.6 * 0.7 * 0.45;
+    for (name, wanted) in [
+        (
+            "cooling_tower",
+            PI * (square(27.0) - square(26.73))
+                * (134.4 + (96_f64.powi(3) + 38.4_f64.powi(3)) / (3.0 * square(72.0))),
+        ),
+        ("nested_rings", 2.0 * PI * PI * 225.0 / 360.0 * rings),
+        (
+            "lens",
+            front_cap + PI * square(12.7) * (6.0 - front - back) + back_cap,
+        ),
+    ] {
+        let found = load(name).exact_volume().expect("one axis");
+        near(name, found, wanted, wanted);
+    }
+    let tank = load("two_material_tank");
+    let [wall, water] = tank.assembly().parts() else {
+        panic!("two parts")
+    };
+    let (wanted, outside) = (
+        PI * square(300.0) * (380.0 + 100.0),
+        PI * square(308.0) * (500.0 + 2.0 / 3.0 * 158.0),
+    );
+    near("water", water.measures().volume, wanted, wanted);
+    // Two quarter ellipses, two cylinders and half a torus for the rim.
+    let wanted = outside - PI * square(300.0) * (500.0 + 100.0) + PI * PI * 16.0 * 304.0;
+    near("wall", wall.measures().volume, wanted, wanted);
+    let together = water.measures().volume + wall.measures().volume;
+    near(
+        "tank",
+        tank.exact_volume().expect("one axis"),
+        together,
+        together,
+    );
+}
+
+/// Solids of several axes: the fractions sum to closed forms, though least well where surfaces of
+/// different axes touch or nearly do, on the ridges of the bicylinder and between balls and race.
+#[test]
+fn fractions_of_crossing_parts() {
+    let load = |name: &str, resolution: u32| {
+        Scene::load_with(
+            format!("scenes/{name}.toml"),
+            &[format!("grid.resolution={resolution}")],
+        )
+        .expect("a shipped scene")
+    };
+    let check = |name: &str, scene: &Scene, wanted: f64, bound: f64| {
+        let grid = scene.grid().expect("a grid");
+        let fractions = sample::fraction(scene, &grid).expect("small");
+        let sum: f64 = fractions.data().iter().map(|&f| f64::from(f)).sum();
+        let found = sum * grid.voxel_volume();
+        eprintln!(
+            "{name}: {found} of {wanted}, relative {:.1e}",
+            (found - wanted).abs() / wanted
+        );
+        assert!(
+            (found - wanted).abs() <= bound * wanted,
+            "{name}: {found} for {wanted}"
+        );
+    };
+    check("steinmetz", &load("steinmetz", 17), 16.0 / 3.0, 2e-6);
+    // The holes cross plate and raised face: each is as long as what it takes away.
+    let flange = load("flange", 41);
+    let whole = flange.assembly().parts()[0].volume().value;
+    let holes = 4.0 * PI * 81.0 * 15.0 + PI * 2.5_f64.powi(2) * 18.0 / 15_f64.to_radians().cos();
+    check("flange", &flange, whole - holes, 1e-8);
+    // Ring and balls are apart.
+    let bearing = load("bearing_outer_ring", 23);
+    let sum = bearing
+        .assembly()
+        .parts()
+        .iter()
+        .map(|part| part.volume().value)
+        .sum();
+    check("bearing outer ring", &bearing, sum, 5e-6);
 }
