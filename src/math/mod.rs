@@ -6,6 +6,7 @@ pub mod disc;
 pub mod gauss;
 pub mod quadrature;
 pub mod similarity;
+pub mod tetrahedra;
 pub mod tolerance;
 
 mod aabb;

@@ -4,6 +4,7 @@
 //! [`crate::solid`], so that one point test serves a whole run; distances and fractions follow row
 //! by row. Layers do not depend on each other: any number of threads gives the same values.
 
+mod divided;
 mod fraction;
 mod layer;
 mod tally;

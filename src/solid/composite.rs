@@ -24,8 +24,8 @@ use std::sync::Arc;
 const TOLERANCE: f64 = 1e-12;
 /// Panels to begin with, times the bodies that each may cross: more are not begun.
 const MOST_BEGUN: usize = 300_000;
-/// Stretches of circles looked at after which the estimates are taken as they are: a minute's work.
-const MOST_WORK: u64 = 100_000_000;
+/// Stretches of circles looked at after which the estimates are taken as they are: half a minute's work.
+const MOST_WORK: u64 = 40_000_000;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 /// Places of the quantities.

@@ -71,7 +71,7 @@ impl Draft {
     }
 
     /// Whether the steps begin with the whole space and take solids from it.
-    fn from_whole(&self) -> bool {
+    fn begins_whole(&self) -> bool {
         self.steps[0].0 != Operation::Add
     }
 
@@ -222,7 +222,7 @@ fn combined(parts: &[Part], factor: &Draft) -> Result<Option<Arc<Body>>, Vec<usi
     let combination = Combination {
         steps: &factor.steps,
         turned: factor.turned,
-        from_whole: factor.from_whole(),
+        from_whole: factor.begins_whole(),
         complement: factor.complement(),
     };
     match combination.joined(parts) {
