@@ -22,9 +22,9 @@
 //! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
 //! * [`nurbs`]: knot vectors, basis functions and their cache, curves, refinement, Bézier pieces.
 //! * [`region`]: a profile's curves as bi-monotone rational pieces; membership by crossings,
-//!   certified closest points, the boundary of the filled region, line integrals.
-//! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, row spans, volume
-//!   fractions of voxels.
+//!   certified closest points, the boundary of the filled region, its moments as line integrals.
+//! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, area, centroid and inertia,
+//!   row spans, volume fractions of voxels.
 //! * [`grid`]: where the voxels are; it knows no geometry.
 //! * [`sample`]: layers of occupancy, fraction, distance and material.
 //! * [`io`]: the EXR stack with its manifest, tables of points; it knows no geometry.
@@ -36,7 +36,8 @@
 //! with a bound on the rounding and, where the bound does not decide, in double-double; no
 //! tolerance takes part beyond the one that calls a point at 2^-88 of the profile on its boundary.
 //! Distances are minima over all stationary points of rational pieces, isolated by the signs of
-//! Bernstein coefficients. Fractions are integrals of closed-form areas. Nothing is sampled.
+//! Bernstein coefficients. Fractions are integrals of closed-form areas. Volume, area and moments are line integrals along the
+//! profile in double-double, with estimates of their errors. Nothing is sampled.
 
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -74,6 +74,8 @@ pub(super) enum Command {
     Voxelize(Voxelize),
     /// Membership and signed distance at given points
     Query(Query),
+    /// Exact volume, area, centroid, inertia tensor and bounds
+    Measure(Measure),
     /// Show what a finished stack holds, and verify its digests
     Info(Info),
     /// Write a manual page, shell completions or the schema of scene files to standard output
@@ -167,6 +169,19 @@ pub(super) enum Column {
     Sdf,
     /// 1 where the distance is exact, 0 where its size is a lower bound
     Certainty,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each solid is measured by itself, then all together as the total. Line integrals along the profile, so nothing
+depends on a grid; +- is an estimate of the absolute error that is not below it. Area counts the whole boundary, flat
+caps included; inertia is about the centroid, for density 1.
+
+Example: voxlathe measure scenes/goblet.toml --json")]
+pub(super) struct Measure {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
 }
 
 #[derive(Debug, Args)]

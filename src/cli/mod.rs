@@ -7,6 +7,7 @@ mod failure;
 mod generate;
 mod info;
 mod interrupt;
+mod measure;
 mod output;
 mod query;
 mod voxelize;
@@ -57,6 +58,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
     match &arguments.command {
         Command::Voxelize(a) => voxelize::run(a, common, console),
         Command::Query(a) => query::run(a, common, console),
+        Command::Measure(a) => measure::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }

@@ -5,6 +5,10 @@ use super::failure::Failure;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 
+/// What is said of an empty composite.
+pub(super) const NOTHING_LEFT: &str =
+    "nothing is left of the solids: what is added is all subtracted, or not in what intersects it";
+
 /// The user's wishes about output.
 #[derive(Debug)]
 pub(super) struct Console {

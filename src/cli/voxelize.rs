@@ -3,7 +3,7 @@
 use super::arguments::{Common, Voxelize};
 use super::failure::Failure;
 use super::interrupt;
-use super::output::{self, Console};
+use super::output::{self, Console, NOTHING_LEFT};
 use crate::error::Error;
 use crate::grid::GridSpec;
 use crate::io::available_bytes;
@@ -77,6 +77,9 @@ pub(super) fn run(
     )?;
     let (sample, write, tally) = stream(&scene, &plan, &writer, console)?;
     let manifest = writer.finish(summary(&scene, &plan, &tally))?;
+    if is_empty(&scene) {
+        console.warn(NOTHING_LEFT);
+    }
     let seconds = Seconds {
         prepare,
         sample,
@@ -402,6 +405,16 @@ fn stream(
     Ok((sample, write, tally))
 }
 
+/// Whether the composite has no volume at all.
+fn is_empty(scene: &Scene) -> bool {
+    scene.exact_volume() == Some(0.0)
+}
+
+fn warnings(scene: &Scene) -> Vec<String> {
+    let nothing = is_empty(scene).then(|| NOTHING_LEFT.to_owned());
+    scene.warnings().iter().cloned().chain(nothing).collect()
+}
+
 fn operation_name(operation: Operation) -> &'static str {
     match operation {
         Operation::Add => "add",
@@ -440,7 +453,7 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<Value> {
         #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
         let volume = sampled.map(|n| n as f64 * voxel);
         let part = scene.assembly().of_material(id);
-        let exact = part.and_then(|m| Some(m.single()?.volume().value));
+        let exact = part.and_then(|m| Some(m.moments()?.volume.value));
         json!({
             "id": id,
             "name": scene.model().materials.get(&id),
@@ -473,7 +486,7 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         volume_exact: scene.exact_volume(),
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
-        warnings: scene.warnings().to_vec(),
+        warnings: warnings(scene),
         material_volumes: Value::Array(material_volumes(scene, plan, tally)),
         certainty: if plan.selection.sdf {
             certainty(&tally.certainty)
@@ -512,7 +525,7 @@ fn document(
         "volume_exact": scene.exact_volume(),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "total": s.total })),
         "peak_memory_bytes": peak_memory(),
-        "warnings": scene.warnings(),
+        "warnings": warnings(scene),
     })
 }
 

@@ -56,24 +56,41 @@ pub struct Integral {
 
 /// One panel: the Kronrod value over [a, b] and its distance from two lesser rules.
 pub fn panel(f: &mut impl FnMut(f64) -> f64, a: f64, b: f64) -> Integral {
+    panel_of(&mut |t| [f(t)], a, b)[0]
+}
+
+/// One panel for several integrands that share their points.
+pub fn panel_of<const N: usize>(
+    f: &mut impl FnMut(f64) -> [f64; N],
+    a: f64,
+    b: f64,
+) -> [Integral; N] {
     let (c, h) = (0.5 * (a + b), 0.5 * (b - a));
     let middle = f(c);
-    let mut kronrod = KRONROD[7] * middle;
-    let mut gauss = GAUSS[3] * middle;
-    let mut added = 0.0;
+    let mut kronrod = middle.map(|v| KRONROD[7] * v);
+    let mut gauss = middle.map(|v| GAUSS[3] * v);
+    let mut added = [0.0; N];
     for i in 0..7 {
-        let pair = f(c - h * NODES[i]) + f(c + h * NODES[i]);
-        kronrod += KRONROD[i] * pair;
-        if i % 2 == 1 {
-            gauss += GAUSS[i / 2] * pair;
-        } else {
-            added += ADDED[i / 2] * pair;
+        let (below, above) = (f(c - h * NODES[i]), f(c + h * NODES[i]));
+        for n in 0..N {
+            let pair = below[n] + above[n];
+            kronrod[n] += KRONROD[i] * pair;
+            if i % 2 == 1 {
+                gauss[n] += GAUSS[i / 2] * pair;
+            } else {
+                added[n] += ADDED[i / 2] * pair;
+            }
         }
     }
-    Integral {
-        value: kronrod * h,
-        error: (kronrod - gauss).abs().max((kronrod - added).abs()) * h.abs(),
-    }
+    std::array::from_fn(|n| {
+        let lesser = (kronrod[n] - gauss[n])
+            .abs()
+            .max((kronrod[n] - added[n]).abs());
+        Integral {
+            value: kronrod[n] * h,
+            error: lesser * h.abs(),
+        }
+    })
 }
 
 /// Integral of `f` over [a, b] with an estimated absolute error of at most `tolerance`, or the

@@ -9,11 +9,11 @@ use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
 use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region, RegionError};
-use crate::solid::{Assembly, Operation, Part, Turn};
+use crate::solid::{Assembly, Measures, Operation, Part, Turn};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A scene made ready: its solid, and the grid it asks for.
 ///
@@ -35,6 +35,7 @@ use std::sync::Arc;
 pub struct Scene {
     model: SceneModel,
     assembly: Assembly,
+    volume: OnceLock<Option<f64>>,
     warnings: Vec<String>,
 }
 
@@ -104,6 +105,7 @@ impl Scene {
         }
         Ok(Self {
             assembly: Assembly::new(parts),
+            volume: OnceLock::new(),
             model,
             warnings,
         })
@@ -144,10 +146,43 @@ impl Scene {
         &self.warnings
     }
 
-    /// The exact volume in cubed scene units, where all solids make one body.
+    /// The volume of the composite in cubed scene units, computed once; `None` where that is too
+    /// much work.
     #[must_use]
     pub fn exact_volume(&self) -> Option<f64> {
-        self.assembly.single().map(|one| one.volume().value)
+        let volume = || Some(self.assembly.moments()?.volume.value);
+        *self.volume.get_or_init(volume)
+    }
+
+    /// Volume, area, centroid, inertia and bounds of the whole solid in scene units, with estimates
+    /// of their errors; `None` where so many solids meet that it would take minutes. Each solid has
+    /// its own as [`Part::measures`](crate::solid::Part::measures).
+    ///
+    /// ```
+    /// use std::f64::consts::PI;
+    /// let scene = voxlathe::Scene::parse(r#"
+    ///     schema = 1
+    ///     [profiles.ring]
+    ///     curves = [{ kind = "circle", center = [1, 0], radius = 0.25 }]
+    ///     [[solid]]
+    ///     kind = "revolve"
+    ///     profile = "ring"
+    ///     angle = 180
+    /// "#)?;
+    /// let found = scene.measures().expect("one solid");
+    /// let volume = PI * PI * 0.25 * 0.25;
+    /// assert!((found.volume - volume).abs() <= found.error_estimate.volume + 1e-15 * volume);
+    /// // The turned surface and two caps.
+    /// let area = 2.0 * PI * PI * 0.25 + 2.0 * PI * 0.25 * 0.25;
+    /// assert!((found.area - area).abs() <= 1e-14 * area);
+    /// let centroid = found.centroid.expect("it is not empty");
+    /// assert!((centroid.y - 2.0 / PI * (1.0 + 0.25 * 0.25 / 4.0)).abs() <= 1e-14);
+    /// assert_eq!(scene.assembly().parts()[0].measures(), found);
+    /// # Ok::<(), voxlathe::Error>(())
+    /// ```
+    #[must_use]
+    pub fn measures(&self) -> Option<Measures> {
+        self.assembly.measures()
     }
 
     /// BLAKE3 of the resolved scene, in hexadecimal.

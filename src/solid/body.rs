@@ -207,6 +207,35 @@ impl Body {
         best
     }
 
+    /// Whether the boxes of the pieces that sweep the surface come within `margin` of a box of the
+    /// half-plane, in the body's unit.
+    pub(super) fn surface_overlaps(&self, r: [f64; 2], z: [f64; 2], margin: f64) -> bool {
+        let wanted = Box2 {
+            min: [r[0], z[0]],
+            max: [r[1], z[1]],
+        }
+        .grown(margin);
+        let mut found = false;
+        self.tree.visit(
+            |b| b.overlaps(&wanted),
+            |i| {
+                let piece = &self.boundary[i as usize].piece;
+                found |= !piece.on_axis && piece.bounds.overlaps(&wanted);
+            },
+        );
+        found
+    }
+
+    /// The body moved by `by`.
+    pub(super) fn translated(&self, by: DVec3) -> Self {
+        Self::new(
+            self.frame.translated(by),
+            self.turn.clone(),
+            self.section.clone(),
+            self.boundary.clone(),
+        )
+    }
+
     /// The nearest point of the solid's surface, in scene units.
     pub(crate) fn foot(&self, point: DVec3, inside: bool) -> Option<DVec3> {
         let p = self.frame.to_local(point).point;

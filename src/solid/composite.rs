@@ -1,19 +1,361 @@
 //! Measures of composites.
+//!
+//! Terms that keep apart are measured each by itself, a term of one body by its exact line
+//! integrals. The others are integrated over their faces: circles of the bodies' surfaces cut where
+//! they cross other bodies, their integrals closed form, then Gauss-Kronrod panels along the
+//! profile, halved where the estimates are largest. Where a circle touches another body the
+//! integrand has a root or a step; halving closes in on it.
+//!
+//! * Error: the panels' estimates, the hair by which a surface's sides are told apart times the
+//!   length of the edges, and the rounding of the sums.
 
 use super::assembly::Assembly;
+use super::body::Body;
+use super::faces::{Faces, QUANTITIES, Sheet, direction};
 use super::measure::{Measures, Moments};
+use super::terms::Term;
+use crate::math::Aabb;
+use crate::math::quadrature::{Integral, panel_of};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Estimated errors to reach, relative to area, volume, volume times size and its square.
+const TOLERANCE: f64 = 1e-12;
+/// Panels to begin with, times the bodies that each may cross: more are not begun.
+const MOST_BEGUN: usize = 300_000;
+/// Stretches of circles looked at after which the estimates are taken as they are: a minute's work.
+const MOST_WORK: u64 = 100_000_000;
+/// Panels whose extremes are refined for each direction.
+const CANDIDATES: usize = 3;
+/// Places of the quantities.
+const AREA: usize = 0;
+const VOLUME: usize = 1;
+const FIRST: usize = 2;
+const SQUARES: usize = 5;
+const PRODUCTS: usize = 8;
+const EDGES: usize = 11;
 
 impl Assembly {
-    /// Volume, area and moments of the whole solid; `None` where bodies may overlap, whose union no
-    /// line integral gives.
+    /// Volume, area and moments of the whole solid; `None` where so many bodies meet that their
+    /// faces would take minutes.
     #[must_use]
     pub fn moments(&self) -> Option<Moments> {
-        Some(self.single()?.moments())
+        Some(self.measured(false)?.0)
     }
 
     /// What a user reads of [`moments`](Self::moments), with the bounds.
     #[must_use]
     pub fn measures(&self) -> Option<Measures> {
-        Some(self.moments()?.measures(Some(self.bounds())))
+        let (moments, bounds) = self.measured(true)?;
+        Some(moments.measures(bounds))
     }
+
+    /// Moments and, where they are asked for, bounds.
+    fn measured(&self, with_bounds: bool) -> Option<(Moments, Option<Aabb>)> {
+        let mut moments = Vec::new();
+        let mut bounds: Option<Aabb> = None;
+        for cluster in self.clusters() {
+            let (one, extent) = match cluster.as_slice() {
+                [Term { factors }] if factors.len() == 1 && !factors[0].complement => {
+                    let body = &self.bodies()[factors[0].body];
+                    (body.moments(), Some(body.bounds()))
+                }
+                terms => over_faces(self.bodies(), terms, with_bounds)?,
+            };
+            moments.push(one);
+            bounds = match (bounds, extent) {
+                (Some(a), Some(b)) => Some(a.union(&b)),
+                (a, b) => a.or(b),
+            };
+        }
+        Some((Moments::sum(&moments), bounds))
+    }
+
+    /// The terms in groups whose boxes keep apart.
+    fn clusters(&self) -> Vec<Vec<Term>> {
+        let mut clusters: Vec<(Aabb, Vec<Term>)> = Vec::new();
+        for term in self.terms() {
+            let Some(own) = extent(self.bodies(), term) else {
+                continue;
+            };
+            let mut joined = (own, vec![term.clone()]);
+            // A larger box may reach clusters that the term's own did not.
+            while let Some(k) = clusters.iter().position(|c| touch(&c.0, &joined.0)) {
+                let (b, terms) = clusters.swap_remove(k);
+                joined.0 = joined.0.union(&b);
+                joined.1.extend(terms);
+            }
+            clusters.push(joined);
+        }
+        clusters.into_iter().map(|c| c.1).collect()
+    }
+}
+
+/// A box around a term; `None` where the boxes of what it keeps do not meet.
+fn extent(bodies: &[Arc<Body>], term: &Term) -> Option<Aabb> {
+    let kept = term.factors.iter().filter(|f| !f.complement);
+    let boxes = kept.map(|f| bodies[f.body].bounds());
+    let meet = boxes.reduce(|a, b| Aabb {
+        min: a.min.max(b.min),
+        max: a.max.min(b.max),
+    })?;
+    meet.min.cmple(meet.max).all().then_some(meet)
+}
+
+fn touch(a: &Aabb, b: &Aabb) -> bool {
+    let margin = 1e-9 * a.longest_side().max(b.longest_side());
+    (a.min - margin).cmple(b.max).all() && (b.min - margin).cmple(a.max).all()
+}
+
+/// A stretch of a sheet with its integrals.
+struct Panel {
+    sheet: Sheet,
+    range: [f64; 2],
+    integrals: [Integral; QUANTITIES],
+}
+
+impl Panel {
+    fn new(faces: &Faces, sheet: Sheet, range: [f64; 2]) -> Self {
+        let integrals = panel_of(&mut |t| faces.flux(sheet, t), range[0], range[1]);
+        Self {
+            sheet,
+            range,
+            integrals,
+        }
+    }
+
+    fn halves(&self) -> [(Sheet, [f64; 2]); 2] {
+        let [a, b] = self.range;
+        let m = 0.5 * (a + b);
+        [(self.sheet, [a, m]), (self.sheet, [m, b])]
+    }
+
+    /// The error of quantity `k` that is not the panel's: the hair moves the edges by as much, and
+    /// what it moves is at most as far from the centre as a body; and the rounding of the sum.
+    fn noise(&self, k: usize, faces: &Faces) -> f64 {
+        let power = match k {
+            AREA => 0,
+            VOLUME => 1,
+            FIRST..SQUARES => 2,
+            _ => 3,
+        };
+        let moved = 2.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
+        moved + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
+    }
+
+    /// The largest error as a multiple of its tolerance.
+    fn excess(&self, tolerances: &[f64; QUANTITIES]) -> f64 {
+        let errors = self.integrals.iter().zip(tolerances);
+        errors.fold(0.0, |m, (i, t)| m.max(i.error / t))
+    }
+}
+
+/// Moments and bounds of terms by integrals over their faces.
+fn over_faces(
+    bodies: &[Arc<Body>],
+    terms: &[Term],
+    with_bounds: bool,
+) -> Option<(Moments, Option<Aabb>)> {
+    let boxes = terms.iter().filter_map(|t| extent(bodies, t));
+    let Some(around) = boxes.reduce(|a, b| a.union(&b)) else {
+        return Some((Moments::EMPTY, None));
+    };
+    let centre = 0.5 * (around.min + around.max);
+    let (bodies, terms) = about(bodies, terms, centre);
+    let size = around.longest_side();
+    let reach = bodies.iter().fold(size, |m, b| {
+        let b = b.bounds();
+        m.max(b.min.abs().max(b.max.abs()).max_element())
+    });
+    let faces = Faces::new(bodies, terms, reach);
+    let mut panels = integrated(&faces, size)?;
+    panels.sort_by(|a, b| {
+        let key = |p: &Panel| p.sheet.number();
+        key(a).cmp(&key(b)).then(a.range[0].total_cmp(&b.range[0]))
+    });
+    let moments = moments(&totals(&panels, &faces), centre);
+    let bounds = if with_bounds && moments.area.value > 0.0 {
+        extremes(&faces, &panels, centre, size)
+    } else {
+        None
+    };
+    Some((moments, bounds))
+}
+
+/// The bodies of the terms, moved so that `centre` is the origin.
+fn about(bodies: &[Arc<Body>], terms: &[Term], centre: DVec3) -> (Vec<Arc<Body>>, Vec<Term>) {
+    let mut places: Vec<Option<usize>> = vec![None; bodies.len()];
+    let mut moved = Vec::new();
+    let mut renumbered = terms.to_vec();
+    for factor in renumbered.iter_mut().flat_map(|t| &mut t.factors) {
+        factor.body = *places[factor.body].get_or_insert_with(|| {
+            moved.push(Arc::new(bodies[factor.body].translated(-centre)));
+            moved.len() - 1
+        });
+    }
+    (moved, renumbered)
+}
+
+/// Panels whose estimated errors sum to the tolerances, or the best there is; `None` where even the
+/// first are too many.
+fn integrated(faces: &Faces, size: f64) -> Option<Vec<Panel>> {
+    let make = |work: Vec<(Sheet, [f64; 2])>| -> Vec<Panel> {
+        let panels = work.into_par_iter();
+        panels
+            .map(|(s, range)| Panel::new(faces, s, range))
+            .collect()
+    };
+    let mut panels = make(faces.sheets(MOST_BEGUN)?);
+    loop {
+        let tolerances = tolerances(&panels, size);
+        let mut order: Vec<(f64, usize)> = panels
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (p.excess(&tolerances), i))
+            .collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        // The worst first, as many as it takes for the rest to be good.
+        let mut left: f64 = order.iter().map(|o| o.0).sum();
+        let worst = order.iter().take_while(|(excess, _)| {
+            let more = left > 0.5;
+            left -= excess;
+            more
+        });
+        let mut chosen: Vec<usize> = worst.map(|o| o.1).collect();
+        let divides = |p: &Panel| {
+            let [a, b] = p.range;
+            let m = 0.5 * (a + b);
+            m > a && m < b
+        };
+        // Halving does not mend rounding.
+        let noisy = |p: &Panel| {
+            (AREA..EDGES)
+                .all(|k| p.integrals[k].error <= p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0))
+        };
+        chosen.retain(|&i| divides(&panels[i]) && !noisy(&panels[i]));
+        if chosen.is_empty() || faces.work() > MOST_WORK {
+            return Some(panels);
+        }
+        chosen.sort_unstable();
+        let mut halves = Vec::new();
+        for &i in chosen.iter().rev() {
+            halves.extend(panels.swap_remove(i).halves());
+        }
+        panels.extend(make(halves));
+    }
+}
+
+/// Errors that are good enough.
+fn tolerances(panels: &[Panel], size: f64) -> [f64; QUANTITIES] {
+    let sum = |k: usize| panels.iter().map(|p| p.integrals[k].value).sum::<f64>();
+    let area = sum(AREA).abs().max(f64::MIN_POSITIVE);
+    // Below this the volume is rounding.
+    let volume = sum(VOLUME).abs().max(1e-12 * area * size);
+    let mut tolerances = [f64::INFINITY; QUANTITIES];
+    tolerances[AREA] = TOLERANCE * area;
+    tolerances[VOLUME] = TOLERANCE * volume;
+    tolerances[FIRST..SQUARES].fill(TOLERANCE * volume * size);
+    tolerances[SQUARES..EDGES].fill(TOLERANCE * volume * size * size);
+    tolerances
+}
+
+/// The sums with their errors.
+fn totals(panels: &[Panel], faces: &Faces) -> [Integral; QUANTITIES] {
+    std::array::from_fn(|k| {
+        panels.iter().fold(Integral::default(), |sum, p| Integral {
+            value: sum.value + p.integrals[k].value,
+            error: sum.error + p.integrals[k].error + p.noise(k, faces),
+        })
+    })
+}
+
+fn moments(total: &[Integral; QUANTITIES], centre: DVec3) -> Moments {
+    let square = |i: usize| total[SQUARES + i];
+    // In the order xy, yz, zx.
+    let product = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+        (0, 1) => total[PRODUCTS],
+        (1, 2) => total[PRODUCTS + 1],
+        _ => total[PRODUCTS + 2],
+    };
+    let volume = Integral {
+        value: total[VOLUME].value.max(0.0),
+        ..total[VOLUME]
+    };
+    if total[AREA].value == 0.0 {
+        return Moments::EMPTY;
+    }
+    Moments {
+        about: centre,
+        volume,
+        area: total[AREA],
+        first: std::array::from_fn(|i| total[FIRST + i]),
+        second: std::array::from_fn(|i| {
+            std::array::from_fn(|j| if i == j { square(i) } else { product(i, j) })
+        }),
+    }
+}
+
+/// Bounds of the faces; `None` where there are none.
+///
+/// The largest coordinate lies on a body's own bound where that is on the composite's boundary,
+/// else on an edge: the best stretches are refined until their extremes stand still.
+fn extremes(faces: &Faces, panels: &[Panel], centre: DVec3, size: f64) -> Option<Aabb> {
+    let visible: Vec<&Panel> = panels
+        .iter()
+        .filter(|p| p.integrals[AREA].value != 0.0)
+        .collect();
+    let sampled: Vec<[f64; 6]> = visible
+        .par_iter()
+        .map(|p| faces.extremes(p.sheet, 0.5 * (p.range[0] + p.range[1])))
+        .collect();
+    let best: [f64; 6] = std::array::from_fn(|k| {
+        let mut order: Vec<usize> = (0..visible.len()).collect();
+        order.sort_by(|&i, &j| sampled[j][k].total_cmp(&sampled[i][k]));
+        let top = order.first().map_or(f64::NEG_INFINITY, |&i| sampled[i][k]);
+        // A body's own bound is exact.
+        let own = |value: f64| {
+            let bounds = faces.bodies.iter().map(|b| b.bounds());
+            let mut extents = bounds.map(|b| direction(k).dot(if k < 3 { b.max } else { b.min }));
+            extents.find(|e| (e - value).abs() <= 1e-11 * size)
+        };
+        own(top).unwrap_or_else(|| {
+            let candidates: Vec<&Panel> =
+                order.iter().take(CANDIDATES).map(|&i| visible[i]).collect();
+            let refined = candidates
+                .into_par_iter()
+                .map(|p| highest(faces, p.sheet, p.range, k));
+            let value = refined.reduce(|| f64::NEG_INFINITY, f64::max);
+            own(value).unwrap_or(value)
+        })
+    });
+    best.iter().all(|b| b.is_finite()).then(|| Aabb {
+        min: centre - DVec3::new(best[3], best[4], best[5]),
+        max: centre + DVec3::new(best[0], best[1], best[2]),
+    })
+}
+
+/// The largest extreme along direction `k` of the circles of a stretch: golden section.
+fn highest(faces: &Faces, sheet: Sheet, [mut a, mut b]: [f64; 2], k: usize) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let value = |t: f64| faces.extremes(sheet, t)[k];
+    let mut best = value(a).max(value(b));
+    let (mut s, mut t) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+    let (mut vs, mut vt) = (value(s), value(t));
+    for _ in 0..80 {
+        best = best.max(vs).max(vt);
+        if vs >= vt {
+            (b, t, vt) = (t, s, vs);
+            s = b - GOLDEN * (b - a);
+            vs = value(s);
+        } else {
+            (a, s, vs) = (s, t, vt);
+            t = a + GOLDEN * (b - a);
+            vt = value(t);
+        }
+        if !(s > a && t > s && b > t && b - a > 1e-13) {
+            break;
+        }
+    }
+    best
 }

@@ -11,8 +11,8 @@
 //!   point near the centroid keep their digits wherever the solid is; from a point `k` sizes away the
 //!   inertia loses `k²`.
 
-use crate::math::Aabb;
 use crate::math::quadrature::Integral;
+use crate::math::{Aabb, Dd};
 use glam::DVec3;
 
 /// Rounding of a sum of a few products, relative to the sum of their sizes.
@@ -169,8 +169,9 @@ impl Moments {
         let offset = DVec3::from_array(self.first.map(|f| f.value / v.value));
         let error = DVec3::from_array(std::array::from_fn(|i| {
             let d = offset[i].abs();
-            (self.first[i].error + d * v.error) / least
-                + f64::EPSILON * (d + 0.5 * (self.about[i] + offset[i]).abs())
+            // What the last addition rounds is known: nothing, where f64 has the coordinate.
+            let rounding = Dd::sum(self.about[i], offset[i]).lo().abs();
+            (self.first[i].error + d * v.error) / least + 2.0 * f64::EPSILON * d + rounding
         }));
         Some((offset, error.length()))
     }
@@ -200,7 +201,8 @@ impl Moments {
 /// The inertia tensor of second moments about its point, with the Frobenius norm of its error.
 fn inertia(second: &[[Integral; 3]; 3]) -> ([[f64; 3]; 3], f64) {
     let negative = |m: Integral| Integral {
-        value: -m.value,
+        // Not -0 where there is nothing.
+        value: 0.0 - m.value,
         error: m.error,
     };
     let tensor: [[Integral; 3]; 3] = std::array::from_fn(|i| {

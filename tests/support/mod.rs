@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test file uses its share")]
 
 pub(crate) mod hard;
+pub(crate) mod integrals;
 pub(crate) mod oracle;
 pub(crate) mod sampling;
 pub(crate) mod text;

@@ -59,7 +59,7 @@ fn atan_inverse(n: f64) -> Big {
     sum
 }
 
-fn pi() -> Big {
+pub(crate) fn pi() -> Big {
     big(16.0) * atan_inverse(5.0) - big(4.0) * atan_inverse(239.0)
 }
 
@@ -87,10 +87,10 @@ pub(crate) fn cos_sin_degrees(degrees: &Big) -> [Big; 2] {
 }
 
 /// A homogeneous control point: (w r, w z, w).
-type Homogeneous = [Big; 3];
-type Piece = Vec<Homogeneous>;
+pub(crate) type Homogeneous = [Big; 3];
+pub(crate) type Piece = Vec<Homogeneous>;
 
-fn dehomogenize(h: &Homogeneous) -> [Big; 2] {
+pub(crate) fn dehomogenize(h: &Homogeneous) -> [Big; 2] {
     [&h[0] / &h[2], &h[1] / &h[2]]
 }
 
@@ -313,7 +313,8 @@ pub(crate) struct SmallPiece {
 /// Loops of pieces: the meridian region.
 #[derive(Debug)]
 pub(crate) struct Region {
-    loops: Vec<Vec<Piece>>,
+    /// Closed chains of pieces.
+    pub(crate) loops: Vec<Vec<Piece>>,
     fill: Fill,
     /// Loops in f64, about `center`.
     pub(crate) small: Vec<Vec<SmallPiece>>,
@@ -649,11 +650,11 @@ fn turn_small(piece: &mut [[f64; 3]], from: i32, to: i32, margin: f64, depth: u3
 pub(crate) struct Solid {
     /// Its meridian region.
     pub(crate) region: Region,
-    origin: [Big; 3],
+    pub(crate) origin: [Big; 3],
     /// Unit vectors of the local axes.
-    axes: [[Big; 3]; 3],
+    pub(crate) axes: [[Big; 3]; 3],
     /// Length of a local unit.
-    scale: Big,
+    pub(crate) scale: Big,
     full: bool,
     wide: bool,
     /// Directions of the caps.

@@ -1,0 +1,322 @@
+//! Circles and segments in space, and where they cross a solid's surface.
+//!
+//! A stretch of a path is left aside where the boxes of the surface's pieces keep clear of it, or
+//! where the distance of its middle exceeds its half length; any other is halved. Below a
+//! ten-thousandth of a turn the signed distances of its ends and its middle stand for all of it,
+//! where a parabola through them leaves no doubt.
+
+use super::body::Body;
+use super::turn::Turn;
+use crate::region::Side;
+use glam::{DVec2, DVec3};
+
+/// A parametrised path in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Path {
+    /// `centre + u cos s + v sin s`, u and v of one length and normal to each other.
+    Circle { centre: DVec3, u: DVec3, v: DVec3 },
+    /// `start + s along`.
+    Line { start: DVec3, along: DVec3 },
+}
+
+/// Half width of a stretch below which a parabola is trusted.
+const TRUST: f64 = 1e-4;
+/// Half width down to which stretches are halved: two crossings nearer to each other than this are
+/// taken for none.
+const FLOOR: f64 = 1e-9;
+/// Stretches after which only wide ones are halved on: the path runs along the surface.
+const MANY: u64 = 4_096;
+/// Half width that then counts as fine.
+const COARSE: f64 = 1e-3;
+
+/// Bounds of (ρ, z) over a stretch.
+struct Reach {
+    r: [f64; 2],
+    z: [f64; 2],
+}
+
+impl Path {
+    pub(super) fn at(&self, s: f64) -> DVec3 {
+        match *self {
+            Self::Circle { centre, u, v } => {
+                let (sin, cos) = s.sin_cos();
+                centre + u * cos + v * sin
+            }
+            Self::Line { start, along } => start + along * s,
+        }
+    }
+
+    /// Length per unit of the parameter.
+    pub(super) fn speed(&self) -> f64 {
+        match self {
+            Self::Circle { u, .. } => u.length(),
+            Self::Line { along, .. } => along.length(),
+        }
+    }
+
+    /// The largest `direction · x` between two parameters.
+    pub(super) fn support(&self, direction: DVec3, [a, b]: [f64; 2]) -> f64 {
+        let ends = direction.dot(self.at(a)).max(direction.dot(self.at(b)));
+        if let Self::Circle { u, v, .. } = self {
+            let peak = direction.dot(*v).atan2(direction.dot(*u));
+            let turns = ((a - peak) / std::f64::consts::TAU).ceil();
+            let first = peak + turns * std::f64::consts::TAU;
+            if first <= b {
+                return ends.max(direction.dot(self.at(peak)));
+            }
+        }
+        ends
+    }
+
+    /// The path in a body's local coordinates.
+    fn local(&self, body: &Body) -> Self {
+        let frame = body.frame();
+        let point = |p| frame.to_local(p).point;
+        let vector = |v| frame.vector_to_local(v);
+        match *self {
+            Self::Circle { centre, u, v } => Self::Circle {
+                centre: point(centre),
+                u: vector(u),
+                v: vector(v),
+            },
+            Self::Line { start, along } => Self::Line {
+                start: point(start),
+                along: vector(along),
+            },
+        }
+    }
+
+    /// First derivative and a bound of the second.
+    fn slopes(&self, s: f64) -> (DVec3, f64) {
+        match *self {
+            Self::Circle { u, v, .. } => {
+                let (sin, cos) = s.sin_cos();
+                (v * cos - u * sin, u.length())
+            }
+            Self::Line { along, .. } => (along, 0.0),
+        }
+    }
+
+    /// Bounds of ρ and z over `middle ± half`, by Taylor's formula. Local coordinates.
+    fn reach(&self, middle: f64, half: f64) -> Reach {
+        let p = self.at(middle);
+        let (d, bend) = self.slopes(middle);
+        let flat = DVec2::new(p.x, p.y);
+        let square = flat.length_squared();
+        let speed = self.speed();
+        let furthest = square.sqrt() + speed * half;
+        let tilt = match self {
+            Self::Circle { u, v, .. } => u.z.hypot(v.z),
+            Self::Line { .. } => 0.0,
+        };
+        // (ρ²)'' = 2 |P'|² + 2 P·P''
+        let curvature = 2.0 * (speed * speed + furthest * bend);
+        let rounding = 8.0 * f64::EPSILON * furthest * furthest;
+        let slope = 2.0 * flat.dot(DVec2::new(d.x, d.y)).abs();
+        let spread = slope * half + 0.5 * curvature * half * half + rounding;
+        let rise = d.z.abs() * half + 0.5 * tilt * half * half;
+        let root = |x: f64| x.max(0.0).sqrt();
+        Reach {
+            r: [root(square - spread), root(square + spread)],
+            z: [p.z - rise, p.z + rise],
+        }
+    }
+
+    /// Whether ρ and z do not change along the path, but for rounding.
+    fn is_coaxial(&self) -> bool {
+        match self {
+            Self::Circle { centre, u, v } => {
+                let size = u.length();
+                let off = centre.x.hypot(centre.y);
+                off <= 1e-14 * size && u.z.hypot(v.z) <= 1e-14 * size
+            }
+            Self::Line { .. } => false,
+        }
+    }
+
+    /// Adds the parameters between `a` and `b` at which the path crosses the body's surface.
+    /// Coordinates are known to within `margin`; within `near` the path counts as running along it.
+    pub(super) fn crossings(
+        &self,
+        body: &Body,
+        [a, b]: [f64; 2],
+        [margin, near]: [f64; 2],
+        out: &mut Vec<f64>,
+    ) -> Searched {
+        let local = self.local(body);
+        let [margin_here, near_here] = [margin, near].map(|m| m / body.frame().scale());
+        let mut along = false;
+        let speed = self.speed();
+        let coaxial = local.is_coaxial();
+        let signed = |s: f64| {
+            let p = self.at(s);
+            let outside = body.side(p) == Side::Outside;
+            let d = body.distance(p, !outside, f64::INFINITY);
+            if outside {
+                d.max(f64::MIN_POSITIVE)
+            } else {
+                -d
+            }
+        };
+        let mut work = vec![Stretch { a, b, ends: None }];
+        let mut seen = 0_u64;
+        while let Some(Stretch { a, b, ends }) = work.pop() {
+            seen += 1;
+            let (m, h) = (0.5 * (a + b), 0.5 * (b - a));
+            let Reach { r, z } = local.reach(m, h);
+            let meets = |margin: f64| {
+                !coaxial && body.surface_overlaps(r, z, margin)
+                    || local.meets_caps(body.turn(), m, h, margin)
+            };
+            if !meets(margin_here) {
+                along = along || meets(near_here);
+                continue;
+            }
+            let middle = signed(m);
+            along |= middle.abs() <= near && h > FLOOR;
+            if middle.abs() >= speed * h * (1.0 + 1e-9) {
+                continue;
+            }
+            let small = h <= TRUST || seen > MANY && h <= COARSE;
+            let mut values = None;
+            if small {
+                let [fa, fb] = ends.unwrap_or_else(|| [signed(a), signed(b)]);
+                values = Some([fa, middle, fb]);
+                let fine = h <= FLOOR || seen > MANY || !(m > a && m < b);
+                match parabola([fa, middle, fb]) {
+                    Crossings::None => continue,
+                    Crossings::One => {
+                        out.push(root(&signed, [a, b], [fa, fb], 0.25 * margin));
+                        continue;
+                    }
+                    Crossings::Unknown if fine => {
+                        if (fa < 0.0) != (fb < 0.0) {
+                            out.push(root(&signed, [a, b], [fa, fb], 0.25 * margin));
+                        }
+                        continue;
+                    }
+                    Crossings::Unknown => {}
+                }
+            }
+            let half = |a, b, ends| Stretch { a, b, ends };
+            work.push(half(m, b, values.map(|[_, m, b]| [m, b])));
+            work.push(half(a, m, values.map(|[a, m, _]| [a, m])));
+        }
+        Searched {
+            along,
+            stretches: seen,
+        }
+    }
+
+    /// Whether a stretch may meet the planes of a wedge's caps. Local coordinates.
+    fn meets_caps(&self, turn: &Turn, middle: f64, half: f64, margin: f64) -> bool {
+        let Turn::Partial(wedge) = turn else {
+            return false;
+        };
+        let p = self.at(middle);
+        let (velocity, bend) = self.slopes(middle);
+        let flat = DVec2::new(p.x, p.y);
+        let slope = DVec2::new(velocity.x, velocity.y);
+        wedge.directions().iter().any(|d| {
+            let room = d.perp_dot(slope).abs() * half + 0.5 * bend * half * half + margin;
+            let beyond = self.speed() * half + margin;
+            d.perp_dot(flat).abs() <= room && d.dot(flat) >= -beyond
+        })
+    }
+}
+
+/// What a search for crossings found besides them.
+pub(super) struct Searched {
+    /// Whether the path may run along the surface.
+    pub(super) along: bool,
+    /// How many stretches were looked at.
+    pub(super) stretches: u64,
+}
+
+/// A stretch of a path with the signed distances of its ends, where they are known.
+struct Stretch {
+    a: f64,
+    b: f64,
+    ends: Option<[f64; 2]>,
+}
+
+/// How often a stretch crosses a surface.
+enum Crossings {
+    None,
+    One,
+    Unknown,
+}
+
+/// What a parabola through the signed distances of both ends and the middle says.
+fn parabola([a, m, b]: [f64; 3]) -> Crossings {
+    let (slope, bend) = (0.5 * (b - a), 0.5 * (a + b) - m);
+    let straight = bend.abs() <= 0.1 * slope.abs();
+    if (a < 0.0) != (b < 0.0) {
+        return if straight {
+            Crossings::One
+        } else {
+            Crossings::Unknown
+        };
+    }
+    if (a < 0.0) != (m < 0.0) {
+        return Crossings::Unknown;
+    }
+    // The vertex of m + slope x + bend x², |x| <= 1, where it is nearest to 0.
+    let nearest = if slope.abs() < 2.0 * bend.abs() {
+        (m - 0.25 * slope * slope / bend)
+            .abs()
+            .min(a.abs())
+            .min(b.abs())
+    } else {
+        a.abs().min(b.abs())
+    };
+    let crosses =
+        slope.abs() < 2.0 * bend.abs() && ((m - 0.25 * slope * slope / bend) < 0.0) != (m < 0.0);
+    if !crosses && nearest > 0.05 * (slope.abs() + bend.abs()) {
+        Crossings::None
+    } else {
+        Crossings::Unknown
+    }
+}
+
+/// The place where signed distances change sign, down to a distance of `zero` or the resolution of
+/// the parameter.
+///
+/// By turns a secant, a step beyond where it led, which closes the bracket from the other side, and
+/// a halving, which serves distances that jump: beside an edge of two faces.
+fn root(
+    signed: &impl Fn(f64) -> f64,
+    [mut a, mut b]: [f64; 2],
+    [mut fa, mut fb]: [f64; 2],
+    zero: f64,
+) -> f64 {
+    for step in 0..120 {
+        let middle = 0.5 * (a + b);
+        if !(b - a > 4.0 * f64::EPSILON * a.abs().max(b.abs()).max(1.0)) {
+            return middle;
+        }
+        let secant = (a * fb - b * fa) / (fb - fa);
+        let proposed = match step % 3 {
+            0 => secant,
+            // The end that the secant moved has the smaller value.
+            1 if fa.abs() < fb.abs() => a + 4.0 * (secant - a).max(1e-16),
+            1 => b - 4.0 * (b - secant).max(1e-16),
+            _ => middle,
+        };
+        let x = if proposed > a && proposed < b {
+            proposed
+        } else {
+            middle
+        };
+        let f = signed(x);
+        if f.abs() <= zero {
+            return x;
+        }
+        if (f < 0.0) == (fa < 0.0) {
+            (a, fa) = (x, f);
+        } else {
+            (b, fb) = (x, f);
+        }
+    }
+    0.5 * (a + b)
+}
