@@ -44,11 +44,12 @@ fn grids(scene: &Scene) -> Vec<GridSpec> {
 #[test]
 fn spans_equal_point_tests() {
     for (name, scene) in scenes() {
+        // Walls thinner than a voxel may hold no centre of one grid.
+        let mut inside = 0;
         for grid in grids(&scene) {
             let occupancy = sample::occupancy(&scene, &grid).expect("small");
             let material = sample::material(&scene, &grid).expect("small");
             let [nx, ny, nz] = grid.dims();
-            let mut inside = 0;
             for (k, j, i) in
                 (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i))))
             {
@@ -66,8 +67,8 @@ fn spans_equal_point_tests() {
                     "{name}: material at {p}"
                 );
             }
-            assert!(inside > 0, "{name}: nothing inside {grid:?}");
         }
+        assert!(inside > 0, "{name}: nothing inside");
     }
 }
 
@@ -82,7 +83,8 @@ fn rows_of_distances_equal_points() {
             {
                 let p = grid.centre(i, j, k);
                 let (found, want) = (*sdf.get(i, j, k), scene.assembly().signed_distance(p));
-                let ulp = f64::from(f32::EPSILON) * want.abs();
+                // A distance that rounds to 0 is the smallest positive of its type.
+                let ulp = f64::from(f32::EPSILON) * want.abs() + f64::from(f32::from_bits(1));
                 assert!(
                     (f64::from(found) - want).abs() <= ulp,
                     "{name}: {found} for {want} at {p}"

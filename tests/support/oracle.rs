@@ -10,8 +10,8 @@
 use dashu_float::{FBig, round::mode::HalfEven};
 use glam::DVec3;
 use voxlathe::scene::{
-    Boundary, CurveKind, CurveModel, Fill, PlaceStep, PointModel, ProfileModel, SceneModel,
-    SolidKind, SolidModel,
+    Boundary, CurveKind, CurveModel, Fill, Operation, PlaceStep, PointModel, ProfileModel,
+    SceneModel, SolidKind, SolidModel,
 };
 
 /// A float of [`BITS`] bits.
@@ -849,11 +849,12 @@ impl Solid {
     }
 }
 
-/// The solids of a scene, joined.
+/// The solids of a scene, combined in their order.
 #[derive(Debug)]
 pub(crate) struct Oracle {
     /// In the order of the scene.
     pub(crate) solids: Vec<Solid>,
+    operations: Vec<Operation>,
 }
 
 impl Oracle {
@@ -862,17 +863,28 @@ impl Oracle {
         let solids = model.solids.iter();
         Self {
             solids: solids.map(|s| Solid::new(s, &model.profiles)).collect(),
+            operations: model.solids.iter().map(|s| s.operation).collect(),
         }
     }
 
-    /// Membership of the union; the flag tells that f64 was enough.
+    /// Whether every solid is added.
+    pub(crate) fn is_union(&self) -> bool {
+        self.operations.iter().all(|o| *o == Operation::Add)
+    }
+
+    /// Membership of what the solids make; the flag tells that f64 was enough.
     pub(crate) fn contains(&self, p: DVec3) -> (bool, bool) {
         let mut cheap = true;
         let mut inside = false;
-        for solid in &self.solids {
+        for (solid, operation) in self.solids.iter().zip(&self.operations) {
             let (one, small) = solid.contains(p);
             cheap &= small;
-            inside |= one;
+            inside = match operation {
+                Operation::Add => inside | one,
+                Operation::Subtract => inside & !one,
+                Operation::Intersect => inside & one,
+                _ => unreachable!("an operation this oracle does not know"),
+            };
         }
         (inside, cheap)
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use voxlathe::scene::{
-    Boundary, CurveKind, CurveModel, Fill, PlaceStep, PointModel, SceneModel, SolidKind,
+    Boundary, CurveKind, CurveModel, Fill, Operation, PlaceStep, PointModel, SceneModel, SolidKind,
 };
 
 /// The scene with every length multiplied by `scale` and `steps` (items of a `place` list) appended
@@ -64,11 +64,16 @@ pub(crate) fn scene_text(model: &SceneModel, scale: f64, steps: &str) -> String 
         if !steps.is_empty() {
             places.push(steps.to_owned());
         }
+        let operation = match solid.operation {
+            Operation::Subtract => "subtract",
+            Operation::Intersect => "intersect",
+            _ => "add",
+        };
         writeln!(
             text,
             "[[solid]]\nname = {:?}\nkind = 'revolve'\nprofile = 'p{profile}'\nangle = {angle:?}\n\
              start = {start:?}\nmaterial = {}\naxis = {{ origin = {:?}, direction = {:?}{x} }}\n\
-             place = [{}]",
+             place = [{}]\noperation = '{operation}'",
             solid.name,
             solid.material,
             axis.origin.map(|o| o * scale),
