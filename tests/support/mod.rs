@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses its share")]
 
+pub(crate) mod composite;
+pub(crate) mod faces;
 pub(crate) mod hard;
 pub(crate) mod integrals;
 pub(crate) mod oracle;

@@ -764,7 +764,11 @@ impl Solid {
 
     /// The point in the solid's own axes and length.
     pub(crate) fn local(&self, p: DVec3) -> [Big; 3] {
-        let d: [Big; 3] = std::array::from_fn(|i| big(p[i]) - &self.origin[i]);
+        self.local_of(&p.to_array().map(big))
+    }
+
+    fn local_of(&self, p: &[Big; 3]) -> [Big; 3] {
+        let d: [Big; 3] = std::array::from_fn(|i| &p[i] - &self.origin[i]);
         std::array::from_fn(|i| dot(&d, &self.axes[i]) / &self.scale)
     }
 
@@ -789,7 +793,12 @@ impl Solid {
     }
 
     fn contains_big(&self, p: DVec3) -> bool {
-        let [x, y, z] = self.local(p);
+        self.contains_of(&p.to_array().map(big))
+    }
+
+    /// Membership of a point that is no f64.
+    pub(crate) fn contains_of(&self, p: &[Big; 3]) -> bool {
+        let [x, y, z] = self.local_of(p);
         let rho = sqrt(&(&x * &x + &y * &y));
         let zero = big(0.0);
         let p = [x, y];
