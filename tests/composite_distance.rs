@@ -104,15 +104,14 @@ fn examine(case: &Case, p: DVec3, all_exact: bool, random: &mut Random) -> Repor
 }
 
 fn check(all: Vec<Composite>, count: usize, all_exact: bool) {
-    let mut failures = String::new();
-    for case in all.into_iter().filter_map(prepared) {
+    let one = |composite: Composite| -> Option<String> {
+        let case = prepared(composite)?;
         let mut random = Random::new(3);
         let mut seeds = case.meetings(200, &mut random);
         let (scale, by) = case.composite.moved;
         let edges = case.model.as_ref().expect("faces").edges();
-        seeds.extend(
-            (0..200.min(edges.len())).map(|_| edges[random.below(edges.len())] * scale + by),
-        );
+        let some = 0..200.min(edges.len());
+        seeds.extend(some.map(|_| edges[random.below(edges.len())] * scale + by));
         let one = |i: usize| {
             let mut random = Random::new(1000 + i as u64);
             let p = case.point(&seeds, &mut random);
@@ -126,6 +125,7 @@ fn check(all: Vec<Composite>, count: usize, all_exact: bool) {
             "{:60} {} points, {} exact, worst {:.1e} size, a lower bound misses at most {:.2} of the truth",
             case.composite.name, report.points, report.exact, report.worst, report.slack
         );
+        let mut failures = String::new();
         for line in report.failures.iter().take(4) {
             failures += line;
             failures += "\n";
@@ -133,18 +133,21 @@ fn check(all: Vec<Composite>, count: usize, all_exact: bool) {
         if report.failures.len() > 4 {
             failures += &format!("... {} in all\n", report.failures.len());
         }
-    }
+        Some(failures)
+    };
+    let failures: Vec<String> = all.into_par_iter().filter_map(one).collect();
+    let failures = failures.concat();
     assert!(failures.is_empty(), "{failures}");
 }
 
 #[test]
 fn never_above_the_truth_and_exact_where_it_says_so() {
-    check(composites(), 200, false);
+    check(composites(), 120, false);
 }
 
 #[test]
 fn coaxial_composites_are_exact_everywhere() {
-    check(coaxial(), 600, true);
+    check(coaxial(), 300, true);
 }
 
 /// Points a scene: `VOXLATHE_POINTS`, or a million.
@@ -180,7 +183,7 @@ fn a_flange_is_exact_near_its_surface() {
     let spacing = 8.0 / 64.0;
     let mut random = Random::new(8);
     let (mut near, mut exact, mut tried) = (0_u32, 0_u32, 0);
-    while near < 30_000 {
+    while near < 16_000 {
         tried += 1;
         assert!(tried < 10_000_000, "few points near the surface");
         let p = support::sampling::uniform(case.low, case.high, &mut random);
@@ -210,7 +213,7 @@ fn no_steeper_than_one() {
         let seeds = case.meetings(100, &mut random);
         let (mut worst, mut mixed) = (0.0_f64, 0.0_f64);
         let mut at = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
-        for _ in 0..1500 {
+        for _ in 0..800 {
             let p = case.point(&seeds, &mut random);
             let away = case.size * 10_f64.powf(random.between(-7.0, -1.0));
             let q = p + sphere(&mut random) * away;
@@ -257,7 +260,10 @@ fn stored_distances_are_those_of_points() {
                 let ulp = f64::from(f32::EPSILON) * want.abs();
                 // What rounds to 0 outside is the smallest positive.
                 let least = want > 0.0 && found == f32::from_bits(1);
-                let same = f64::from(found) == want || (f64::from(found) - want).abs() <= ulp;
+                // So is what has no surface as far as numbers go.
+                let most = want > f64::from(f32::MAX) && found >= f32::MAX;
+                let same =
+                    most || f64::from(found) == want || (f64::from(found) - want).abs() <= ulp;
                 assert!(
                     same || (least && want < f64::from(found)),
                     "{}: {found} for {want} at {p}",

@@ -91,7 +91,7 @@ fn check(all: Vec<Composite>, count: usize) {
 
 #[test]
 fn booleans_of_the_single_answers() {
-    check(composites(), 1000);
+    check(composites(), 600);
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn coaxial_booleans_of_the_single_answers() {
 
 #[test]
 fn chains_of_many_solids() {
-    check((100..112).map(|seed| chain(seed, 10)).collect(), 400);
+    check((100..112).map(|seed| chain(seed, 10)).collect(), 250);
 }
 
 /// Points a scene: `VOXLATHE_POINTS`, or a million.

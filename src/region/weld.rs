@@ -38,7 +38,6 @@ pub(crate) fn welded(boundary: Vec<BoundaryPiece>, tolerance: f64) -> Option<Vec
         .iter()
         .flat_map(|b| [b.piece.start, b.piece.end])
         .collect();
-    // In this order the first of a cluster has its least r: 0 stays 0.
     let mut order: Vec<usize> = (0..ends.len()).collect();
     let key = |i: usize| ends[i].map(Real::f64);
     order.sort_by(|&i, &j| key(i)[1].total_cmp(&key(j)[1]).then(i.cmp(&j)));
@@ -52,14 +51,27 @@ pub(crate) fn welded(boundary: Vec<BoundaryPiece>, tolerance: f64) -> Option<Vec
             return None;
         }
     }
-    let mut place: Vec<Option<[Dd; 2]>> = vec![None; ends.len()];
+    // A flat face stays in its plane and a cylinder on its radius, whatever curve ends there.
+    let mut place: Vec<[Option<(u8, Dd)>; 2]> = vec![[None; 2]; ends.len()];
     for (i, end) in ends.iter().enumerate() {
+        let piece = &boundary[i / 2].piece;
         let at = &mut place[clusters.root(i)];
-        if at.is_none_or(|p| end[0] < p[0]) {
-            *at = Some(*end);
+        for c in 0..2 {
+            let weight = match piece.degree() {
+                1 if piece.start[c] == piece.end[c] => 2,
+                1 => 1,
+                _ => 0,
+            };
+            let better = |(w, v): (u8, Dd)| weight > w || weight == w && end[c] < v;
+            if at[c].is_none_or(better) {
+                at[c] = Some((weight, end[c]));
+            }
         }
     }
-    let mut at = |i: usize| place[clusters.root(i)].unwrap_or(ends[i]);
+    let mut at = |i: usize| {
+        let root = clusters.root(i);
+        [0, 1].map(|c| place[root][c].map_or(ends[i][c], |(_, v)| v))
+    };
     let moved = boundary.into_iter().enumerate();
     Some(
         moved

@@ -1,6 +1,6 @@
 //! The share of a voxel that several bodies touch.
 //!
-//! The voxel is divided until the bounds of its parts sum to less than 2e-6. A part that one body
+//! The voxel is divided until the doubts of its parts sum to less than 1e-6. A part that one body
 //! touches takes that body's integral. In one that several touch each surface is nearly a plane:
 //!
 //! ```text
@@ -19,34 +19,32 @@ use glam::DVec3;
 use smallvec::SmallVec;
 use std::collections::BinaryHeap;
 
-/// Width of the bounds at which a divided voxel is done.
-const WIDTH: f64 = 2e-6;
+/// Doubt at which a divided voxel is done.
+const DOUBT: f64 = 1e-6;
 /// Most cells a voxel that two bodies touch is divided into; fewer for more bodies, as each cell
 /// asks all of them.
 const CELLS: usize = 6_000;
 /// Most different surfaces of one cell whose combinations are gone through.
 const MOST_SHEETS: usize = 6;
+/// Deviation, as a share of the cell's shortest side, up to which a surface counts as a plane.
+const FLAT: f64 = 0.1;
 /// Distances nearer than this to each other, as a share of the cell's diagonal, are those of one
 /// surface.
 const SAME: f64 = 1e-9;
 
-/// A part of a voxel with bounds on the volume inside.
+/// A part of a voxel.
 struct Cell {
     centre: DVec3,
     sides: DVec3,
-    low: f64,
-    high: f64,
-}
-
-impl Cell {
-    fn gap(&self) -> f64 {
-        self.high - self.low
-    }
+    /// Estimate of the volume inside.
+    inside: f64,
+    /// How far the volume inside may be from it.
+    doubt: f64,
 }
 
 impl PartialEq for Cell {
     fn eq(&self, o: &Self) -> bool {
-        self.gap() == o.gap()
+        self.doubt == o.doubt
     }
 }
 impl Eq for Cell {}
@@ -57,7 +55,7 @@ impl PartialOrd for Cell {
 }
 impl Ord for Cell {
     fn cmp(&self, o: &Self) -> std::cmp::Ordering {
-        self.gap().total_cmp(&o.gap())
+        self.doubt.total_cmp(&o.doubt)
     }
 }
 
@@ -74,8 +72,8 @@ impl Cell {
                 Share::Some
             }
         };
-        let [low, high] = match open_terms(terms, share) {
-            None => [1.0; 2],
+        let [inside, doubt] = match open_terms(terms, share) {
+            None => [1.0, 0.0],
             Some(open) => match open.as_slice() {
                 [] => [0.0; 2],
                 [term] if term.factors.len() == 1 => {
@@ -85,7 +83,7 @@ impl Cell {
                     let body = &assembly.bodies()[one.body];
                     let alone =
                         body.fraction(&CellShape::new(body.frame(), sides), centre, tolerance);
-                    [if one.complement { 1.0 - alone } else { alone }; 2]
+                    [if one.complement { 1.0 - alone } else { alone }, 0.0]
                 }
                 several => between_planes(assembly, several, centre, sides),
             },
@@ -93,8 +91,8 @@ impl Cell {
         Self {
             centre,
             sides,
-            low: low.min(high) * volume,
-            high: high * volume,
+            inside: inside * volume,
+            doubt: doubt * volume,
         }
     }
 }
@@ -168,6 +166,12 @@ impl Sheet {
         }
     }
 
+    /// Whether the plane is worth its deviation. Elsewhere a part of the surface may lie between the
+    /// points: a distance that is nearly linear over all of them has a slope of 1.
+    fn is_nearly_flat(&self, half: DVec3) -> bool {
+        (self.slope.length() - 1.0).abs() <= FLAT && self.deviation <= FLAT * half.min_element()
+    }
+
     /// The volume within the deviation of the plane.
     fn band(&self, half: DVec3) -> f64 {
         let within = |by: f64| box_volume_within(half, &[self.half_space(true, by)]);
@@ -175,7 +179,7 @@ impl Sheet {
     }
 }
 
-/// Bounds of the share of a cell that several bodies touch.
+/// The share of a cell that several bodies touch, and its doubt.
 fn between_planes(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3) -> [f64; 2] {
     let half = 0.5 * sides;
     let bodies = bodies_of(terms);
@@ -194,7 +198,7 @@ fn between_planes(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVe
         }));
     }
     if sheets.len() > MOST_SHEETS {
-        return [0.0, 1.0];
+        return [0.5, 1.0];
     }
     // Bit k of a combination: inside sheet k.
     let holds = |combination: usize| {
@@ -216,12 +220,15 @@ fn between_planes(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVe
         volume += box_volume_within(half, &spaces);
     }
     let matters = |k: usize| (0..combinations).any(|c| holds(c) != holds(c ^ (1 << k)));
-    let doubtful: f64 = (0..sheets.len())
-        .filter(|&k| matters(k))
-        .map(|k| sheets[k].band(half))
-        .sum();
-    let whole = sides.element_product();
-    [volume - doubtful, volume + doubtful].map(|v| (v / whole).clamp(0.0, 1.0))
+    let doubt = |k: usize| {
+        if sheets[k].is_nearly_flat(half) {
+            sheets[k].band(half)
+        } else {
+            sides.element_product()
+        }
+    };
+    let doubts: f64 = (0..sheets.len()).filter(|&k| matters(k)).map(doubt).sum();
+    [volume, doubts].map(|v| (v / sides.element_product()).clamp(0.0, 1.0))
 }
 
 /// The bodies of the terms, in order.
@@ -239,22 +246,22 @@ pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: D
     let bodies = bodies_of(terms);
     let cell_of = |centre, sides| Cell::new(assembly, terms, centre, sides, whole);
     let mut heap = BinaryHeap::new();
-    let mut gap = 0.0;
+    let mut doubt = 0.0;
     for (centre, sides) in flat_faces_apart(assembly, &bodies, centre, sides) {
         let cell = cell_of(centre, sides);
-        gap += cell.gap();
+        doubt += cell.doubt;
         heap.push(cell);
     }
     let most = (2 * CELLS / bodies.len()).max(64);
-    while gap > WIDTH * whole && heap.len() < most {
+    while doubt > DOUBT * whole && heap.len() < most {
         let Some(cell) = heap.pop() else { break };
-        gap -= cell.gap();
+        doubt -= cell.doubt;
         let half = cell.sides * 0.5;
         for n in 0..8 {
             let side = |bit: u32| if n >> bit & 1 == 1 { 0.5 } else { -0.5 };
             let at = cell.centre + half * DVec3::new(side(0), side(1), side(2));
             let part = cell_of(at, half);
-            gap += part.gap();
+            doubt += part.doubt;
             heap.push(part);
         }
     }
@@ -266,7 +273,7 @@ pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: D
             .map(f64::to_bits)
             .cmp(&b.centre.to_array().map(f64::to_bits))
     });
-    (cells.iter().map(|c| 0.5 * (c.low + c.high)).sum::<f64>() / whole).clamp(0.0, 1.0)
+    (cells.iter().map(|c| c.inside).sum::<f64>() / whole).clamp(0.0, 1.0)
 }
 
 /// Cuts a voxel at the flat faces normal to a grid axis, where faces of two bodies may coincide

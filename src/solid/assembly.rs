@@ -171,11 +171,40 @@ impl Assembly {
             let mut factors = term.factors.iter();
             factors.all(|f| f.side(self.bodies[f.body].side(p)) == Side::Inside)
         };
-        let places = (0..27_u32).filter(|n| *n != 13);
-        places.into_iter().any(|n| {
+        let inward = self.inward(term, point, size);
+        let lattice = (0..27_u32).filter(|n| *n != 13).map(|n| {
             let offset = |d: u32| f64::from(n / d % 3) - 1.0;
-            interior(point + step * DVec3::new(offset(1), offset(3), offset(9)))
-        })
+            DVec3::new(offset(1), offset(3), offset(9))
+        });
+        // The middle of the normals of all faces, and of each two, is within the sharpest edge.
+        let all = inward.iter().copied().sum::<DVec3>();
+        let pairs = (0..inward.len())
+            .flat_map(|i| (0..i).map(move |j| (i, j)))
+            .map(|(i, j)| inward[i] + inward[j]);
+        let middles = pairs.chain([all]).filter_map(DVec3::try_normalize);
+        let mut directions = lattice.chain(middles);
+        directions.any(|d| interior(point + step * d))
+    }
+
+    /// Unit normals into the factors of a term that meet at the point, from differences of their
+    /// distances nearby.
+    fn inward(&self, term: &Term, point: DVec3, size: f64) -> Vec<DVec3> {
+        let near = 1e-6 * size;
+        let meeting = term
+            .factors
+            .iter()
+            .filter(|f| self.bodies[f.body].side(point) == Side::On);
+        let normal = |f: &Factor| {
+            let body = &self.bodies[f.body];
+            let depth = |p: DVec3| {
+                let side = body.side(p);
+                let d = body.distance(p, side != Side::Outside, f64::INFINITY);
+                if f.side(side) == Side::Inside { d } else { -d }
+            };
+            let across = DVec3::AXES.map(|e| depth(point + near * e) - depth(point - near * e));
+            DVec3::from_array(across).try_normalize()
+        };
+        meeting.filter_map(normal).collect()
     }
 
     /// The material at the point: that of the last added part holding it, 0 outside.

@@ -200,7 +200,12 @@ impl Body {
                 across
             } else {
                 let room = (best * best - across * across).sqrt();
-                across.hypot(self.edges.distance([along, p.z], room))
+                let off = self.edges.distance([along, p.z], room);
+                if off >= room {
+                    // Nothing nearer; the sum of the squares might round to less.
+                    continue;
+                }
+                across.hypot(off)
             };
             best = best.min(distance);
         }

@@ -131,8 +131,9 @@ impl Panel {
         [(self.sheet, [a, m]), (self.sheet, [m, b])]
     }
 
-    /// The error of quantity `k` that is not the panel's: the hair moves the edges by as much, and
-    /// what it moves is at most as far from the centre as a body; and the rounding of the sum.
+    /// The error of quantity `k` that is not the panel's: the hair moves the edges by as much, a few
+    /// times that where faces meet at a slant, and what it moves is at most as far from the centre
+    /// as a body; and the rounding of the sum.
     fn noise(&self, k: usize, faces: &Faces) -> f64 {
         let power = match k {
             AREA => 0,
@@ -140,7 +141,7 @@ impl Panel {
             FIRST..SQUARES => 2,
             _ => 3,
         };
-        let moved = 2.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
+        let moved = 8.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
         moved + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
     }
 

@@ -328,7 +328,7 @@ pub(crate) struct Model {
 }
 
 /// Cells a side of a face.
-const CELLS: usize = 120;
+const CELLS: usize = 90;
 
 impl Model {
     /// `None` where a profile has no implicit faces.
@@ -461,6 +461,13 @@ impl Model {
             met[usize::from(self.inside(q))] = true;
             met[0] && met[1]
         };
+        for &f in &near {
+            // At the tip of a cone its normal says little.
+            let axis = self.faces[f].axes.z_axis;
+            if matches!(self.faces[f].form, Form::Cone(..)) && (look(axis) || look(-axis)) {
+                return true;
+            }
+        }
         if normals.len() == 1 {
             return look(normals[0]) || look(-normals[0]);
         }
