@@ -42,12 +42,18 @@ fn angle_less_sine(a: f64) -> f64 {
                 * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0 * (1.0 - a2 / 110.0 * (1.0 - a2 / 156.0)))))
 }
 
+/// Chord, as a share of the radius, that is a rounding at a corner and no part of an edge.
+const GRAZE: f64 = 1e-9;
+
 /// Area of the circular segment cut off by the chord from `p` to `q`, both on the circle of radius
 /// `r` about the origin, on the side of the counter-clockwise arc.
-fn segment_area(p: DVec2, q: DVec2, r: f64) -> f64 {
+///
+/// Between points that differ by a rounding the arc is nothing, unless it is said to be `around`
+/// the whole circle.
+fn segment_area(p: DVec2, q: DVec2, r: f64, around: bool) -> f64 {
     let half_chord = 0.5 * (q - p).length();
     let mut angle = 2.0 * (half_chord / r).min(1.0).asin();
-    if p.perp_dot(q) < 0.0 {
+    if p.perp_dot(q) < 0.0 && (around || half_chord > GRAZE * r) {
         angle = std::f64::consts::TAU - angle;
     }
     0.5 * r * r * angle_less_sine(angle)
@@ -110,12 +116,15 @@ pub fn polygon_disc_area(polygon: &[DVec2], r: f64) -> f64 {
             0.0
         };
     };
+    // A circle within the polygon that only touches its edges goes all around.
+    let touches = |&(p, q): &(DVec2, DVec2)| (q - p).length() <= 1e3 * GRAZE * r;
+    let around = holds_origin && parts.iter().all(touches);
     let mut area = 0.0;
     for (i, &(p, q)) in parts.iter().enumerate() {
         let next = parts[(i + 1) % parts.len()].0;
         area += 0.5 * (p - origin).perp_dot(q - origin);
         if q != next {
-            area += 0.5 * (q - origin).perp_dot(next - origin) + segment_area(q, next, r);
+            area += 0.5 * (q - origin).perp_dot(next - origin) + segment_area(q, next, r, around);
         }
     }
     area

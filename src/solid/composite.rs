@@ -141,7 +141,7 @@ impl Panel {
             FIRST..SQUARES => 2,
             _ => 3,
         };
-        let moved = 8.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
+        let moved = 4.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
         moved + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
     }
 
