@@ -92,7 +92,7 @@ fn voxelize_prints_one_document_with_the_keys_of_the_contract() {
     ]);
     let volume = d.exits(0).json()["volume_exact"].as_f64();
     let volume = volume.expect("the volume of a composite");
-    assert!((volume - 7694.710_792_837_6).abs() <= 1e-8, "{volume}");
+    assert!((volume - 7_694.710_792_837_6).abs() <= 1e-8, "{volume}");
 }
 
 #[test]
