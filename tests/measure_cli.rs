@@ -180,17 +180,3 @@ fn failures_have_their_exit_codes_and_threads_change_nothing() {
     };
     assert_eq!(of("1"), of("3"));
 }
-
-#[test]
-fn a_union_that_is_not_measured_is_null_and_says_so() {
-    let done = run(&["measure", &shipped("overlap"), "--json"]).exits(0);
-    let d = done.json();
-    assert_eq!(d["solids"].as_array().map(Vec::len), Some(3));
-    assert_eq!(d["total"], Value::Null);
-    let warnings = d["warnings"].as_array().expect("warnings");
-    assert!(
-        warnings
-            .iter()
-            .any(|w| w.as_str().is_some_and(|w| w.starts_with("total:")))
-    );
-}

@@ -178,7 +178,7 @@ impl Moments {
 
     /// The second moments about `about + offset`, where that is the centroid: S - F Fᵀ / V.
     fn centred(&self, offset: DVec3) -> [[Integral; 3]; 3] {
-        std::array::from_fn(|i| {
+        let centred: [[Integral; 3]; 3] = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 sum(&[
                     self.second[i][j],
@@ -194,7 +194,9 @@ impl Moments {
                     },
                 ])
             })
-        })
+        });
+        // One half twice: the two differ by the order of their roundings.
+        std::array::from_fn(|i| std::array::from_fn(|j| centred[i.min(j)][i.max(j)]))
     }
 }
 
