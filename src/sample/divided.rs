@@ -14,16 +14,16 @@
 
 use super::fraction::{Share, open_terms, reach};
 use crate::math::tetrahedra::{HalfSpace, box_volume_within};
-use crate::solid::{Assembly, Body, CellShape, TOLERANCE, Term};
+use crate::solid::{Assembly, Body, CellShape, Factor, TOLERANCE, Term};
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::collections::BinaryHeap;
 
 /// Doubt at which a divided voxel is done.
-const DOUBT: f64 = 1e-6;
+const DOUBT: f64 = 2e-6;
 /// Most cells a voxel that two bodies touch is divided into; fewer for more bodies, as each cell
 /// asks all of them.
-const CELLS: usize = 6_000;
+const CELLS: usize = 20_000;
 /// Most different surfaces of one cell whose combinations are gone through.
 const MOST_SHEETS: usize = 6;
 /// Deviation, as a share of the cell's shortest side, up to which a surface counts as a plane.
@@ -36,15 +36,22 @@ const SAME: f64 = 1e-9;
 struct Cell {
     centre: DVec3,
     sides: DVec3,
-    /// Estimate of the volume inside.
-    inside: f64,
-    /// How far the volume inside may be from it.
+    content: Content,
+    /// How far the volume inside may be from what the content says.
     doubt: f64,
+}
+
+/// What is in a part of a voxel.
+enum Content {
+    Known(f64),
+    /// One body, or its complement.
+    One(Factor),
+    Several(Meeting),
 }
 
 impl PartialEq for Cell {
     fn eq(&self, o: &Self) -> bool {
-        self.doubt == o.doubt
+        self.cmp(o).is_eq()
     }
 }
 impl Eq for Cell {}
@@ -55,45 +62,101 @@ impl PartialOrd for Cell {
 }
 impl Ord for Cell {
     fn cmp(&self, o: &Self) -> std::cmp::Ordering {
-        self.doubt.total_cmp(&o.doubt)
+        // Equal doubts in the order of their places, so that nothing depends on the heap.
+        let place = |c: &Self| c.centre.to_array().map(f64::to_bits);
+        let order = self.doubt.total_cmp(&o.doubt);
+        order.then_with(|| place(self).cmp(&place(o)))
     }
 }
 
-impl Cell {
-    fn new(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3, whole: f64) -> Self {
-        let volume = sides.element_product();
+/// A voxel being divided.
+struct Voxel<'a> {
+    assembly: &'a Assembly,
+    terms: &'a [Term],
+    volume: f64,
+}
+
+impl Voxel<'_> {
+    fn body(&self, b: usize) -> &Body {
+        &self.assembly.bodies()[b]
+    }
+
+    /// Error allowed to a cell's share: a small part need not be known better than the voxel.
+    fn tolerance(&self, sides: DVec3) -> f64 {
+        (TOLERANCE * self.volume / sides.element_product()).min(1e-4)
+    }
+
+    /// A body's share of a cell.
+    fn alone(&self, b: usize, centre: DVec3, sides: DVec3, spaces: &[HalfSpace]) -> f64 {
+        let shape = CellShape::new(self.body(b).frame(), sides);
+        let tolerance = self.tolerance(sides);
+        self.body(b)
+            .fraction_within(&shape, centre, spaces, tolerance)
+    }
+
+    fn cell(&self, centre: DVec3, sides: DVec3) -> Cell {
         let reach = reach(sides);
         let share = |b: usize| {
-            let body = &assembly.bodies()[b];
-            let inside = body.contains(centre);
-            if body.distance(centre, inside, reach) >= reach {
+            let inside = self.body(b).contains(centre);
+            if self.body(b).distance(centre, inside, reach) >= reach {
                 Share::of(inside)
             } else {
                 Share::Some
             }
         };
-        let [inside, doubt] = match open_terms(terms, share) {
-            None => [1.0, 0.0],
-            Some(open) => match open.as_slice() {
-                [] => [0.0; 2],
-                [term] if term.factors.len() == 1 => {
-                    // A small part of the voxel need not be known better than the voxel.
-                    let tolerance = (TOLERANCE * whole / volume).min(1e-4);
-                    let one = term.factors[0];
-                    let body = &assembly.bodies()[one.body];
-                    let alone =
-                        body.fraction(&CellShape::new(body.frame(), sides), centre, tolerance);
-                    [if one.complement { 1.0 - alone } else { alone }, 0.0]
-                }
-                several => between_planes(assembly, several, centre, sides),
-            },
-        };
-        Self {
+        let (content, doubt) = self.content(open_terms(self.terms, share), centre, sides);
+        Cell {
             centre,
             sides,
-            inside: inside * volume,
-            doubt: doubt * volume,
+            content,
+            doubt: doubt * sides.element_product(),
         }
+    }
+
+    fn content(&self, open: Option<Vec<Term>>, centre: DVec3, sides: DVec3) -> (Content, f64) {
+        let Some(terms) = open else {
+            return (Content::Known(1.0), 0.0);
+        };
+        match terms.as_slice() {
+            [] => (Content::Known(0.0), 0.0),
+            [term] if term.factors.len() == 1 => (Content::One(term.factors[0]), 0.0),
+            _ => {
+                let (meeting, doubt) = Meeting::new(self, terms, centre, sides);
+                if doubt <= DOUBT {
+                    return (Content::Several(meeting), doubt);
+                }
+                // A surface that only runs along the cell's faces is none within.
+                let shares: Vec<(usize, Share)> = bodies_of(&meeting.terms)
+                    .into_iter()
+                    .map(|b| match self.alone(b, centre, sides, &[]) {
+                        0.0 => (b, Share::Nothing),
+                        1.0 => (b, Share::All),
+                        _ => (b, Share::Some),
+                    })
+                    .collect();
+                if shares.iter().all(|s| s.1 == Share::Some) {
+                    return (Content::Several(meeting), doubt);
+                }
+                let share = |b: usize| {
+                    let known = shares.iter().find(|s| s.0 == b);
+                    known.map_or(Share::Some, |s| s.1)
+                };
+                self.content(open_terms(&meeting.terms, share), centre, sides)
+            }
+        }
+    }
+
+    /// The volume inside a cell.
+    fn inside(&self, cell: &Cell) -> f64 {
+        let share = match &cell.content {
+            Content::Known(share) => *share,
+            Content::One(f) => {
+                let alone = self.alone(f.body, cell.centre, cell.sides, &[]);
+                if f.complement { 1.0 - alone } else { alone }
+            }
+            Content::Several(meeting) => meeting.share(self, cell.centre, cell.sides),
+        };
+        share * cell.sides.element_product()
     }
 }
 
@@ -103,6 +166,7 @@ const POINTS: usize = 15;
 /// A surface within a cell: `|sd(x) - (level + slope·x)| <= deviation`, x from the cell's centre.
 #[derive(Debug, Clone, Copy)]
 struct Sheet {
+    body: usize,
     values: [f64; POINTS],
     level: f64,
     slope: DVec3,
@@ -110,7 +174,8 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn new(body: &Body, centre: DVec3, half: DVec3) -> Self {
+    fn new(voxel: &Voxel, b: usize, centre: DVec3, half: DVec3) -> Self {
+        let body = voxel.body(b);
         let signed = |x: DVec3| {
             let p = centre + x;
             let inside = body.contains(p);
@@ -136,6 +201,7 @@ impl Sheet {
             rest().fold(f64::NEG_INFINITY, f64::max),
         );
         Self {
+            body: b,
             values,
             level: 0.5 * (low + high),
             slope,
@@ -172,63 +238,115 @@ impl Sheet {
         (self.slope.length() - 1.0).abs() <= FLAT && self.deviation <= FLAT * half.min_element()
     }
 
-    /// The volume within the deviation of the plane.
-    fn band(&self, half: DVec3) -> f64 {
+    /// The volume that taking the surface for a plane may be wrong by.
+    fn doubt(&self, half: DVec3) -> f64 {
+        if !self.is_nearly_flat(half) {
+            return 8.0 * half.element_product();
+        }
         let within = |by: f64| box_volume_within(half, &[self.half_space(true, by)]);
         within(self.deviation) - within(-self.deviation)
     }
 }
 
-/// The share of a cell that several bodies touch, and its doubt.
-fn between_planes(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3) -> [f64; 2] {
-    let half = 0.5 * sides;
-    let bodies = bodies_of(terms);
-    let mut sheets: Vec<Sheet> = Vec::new();
-    // For each body its sheet, and whether that has the body's other side inside.
-    let mut of_body: Vec<(usize, bool)> = Vec::new();
-    for &b in &bodies {
-        let sheet = Sheet::new(&assembly.bodies()[b], centre, half);
-        let room = SAME * reach(sides);
-        let known = sheets.iter().enumerate();
-        let mut known = known.filter_map(|(k, s)| Some((k, s.same(&sheet, room)?)));
-        let place = known.next();
-        of_body.push(place.unwrap_or_else(|| {
-            sheets.push(sheet);
-            (sheets.len() - 1, false)
-        }));
+/// The surfaces of several bodies in a cell. One keeps its shape, the others are planes.
+struct Meeting {
+    terms: Vec<Term>,
+    bodies: Vec<usize>,
+    sheets: Vec<Sheet>,
+    /// For each body its sheet, and whether that has the body's other side inside.
+    of_body: Vec<(usize, bool)>,
+    /// The sheet that keeps its shape.
+    kept: usize,
+}
+
+impl Meeting {
+    /// The meeting and its doubt, as a share of the cell.
+    fn new(voxel: &Voxel, terms: Vec<Term>, centre: DVec3, sides: DVec3) -> (Self, f64) {
+        let half = 0.5 * sides;
+        let bodies = bodies_of(&terms);
+        let mut sheets: Vec<Sheet> = Vec::new();
+        let mut of_body: Vec<(usize, bool)> = Vec::new();
+        for &b in &bodies {
+            let sheet = Sheet::new(voxel, b, centre, half);
+            let room = SAME * reach(sides);
+            let known = sheets.iter().enumerate();
+            let mut known = known.filter_map(|(k, s)| Some((k, s.same(&sheet, room)?)));
+            let place = known.next();
+            of_body.push(place.unwrap_or_else(|| {
+                sheets.push(sheet);
+                (sheets.len() - 1, false)
+            }));
+        }
+        let mut meeting = Self {
+            terms,
+            bodies,
+            sheets,
+            of_body,
+            kept: 0,
+        };
+        if meeting.sheets.len() > MOST_SHEETS {
+            return (meeting, 1.0);
+        }
+        let doubts: Vec<f64> = (0..meeting.sheets.len())
+            .map(|k| {
+                if meeting.matters(k) {
+                    meeting.sheets[k].doubt(half)
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let worst = (0..doubts.len()).max_by(|&a, &b| doubts[a].total_cmp(&doubts[b]));
+        meeting.kept = worst.unwrap_or_default();
+        let doubt = doubts.iter().sum::<f64>() - doubts[meeting.kept];
+        (meeting, (doubt / sides.element_product()).min(1.0))
     }
-    if sheets.len() > MOST_SHEETS {
-        return [0.5, 1.0];
-    }
-    // Bit k of a combination: inside sheet k.
-    let holds = |combination: usize| {
-        terms.iter().any(|term| {
+
+    /// Whether the terms hold a combination of sides; bit k is set inside sheet k.
+    fn holds(&self, combination: usize) -> bool {
+        self.terms.iter().any(|term| {
             term.factors.iter().all(|f| {
-                let (k, flipped) = of_body[bodies.binary_search(&f.body).unwrap_or_default()];
+                let place = self.bodies.binary_search(&f.body).unwrap_or_default();
+                let (k, flipped) = self.of_body[place];
                 (combination >> k & 1 == 1) != (flipped != f.complement)
             })
         })
-    };
-    let combinations = 1_usize << sheets.len();
-    let mut volume = 0.0;
-    for combination in (0..combinations).filter(|&c| holds(c)) {
-        let spaces: SmallVec<[HalfSpace; MOST_SHEETS]> = sheets
-            .iter()
-            .enumerate()
-            .map(|(k, s)| s.half_space(combination >> k & 1 == 1, 0.0))
-            .collect();
-        volume += box_volume_within(half, &spaces);
     }
-    let matters = |k: usize| (0..combinations).any(|c| holds(c) != holds(c ^ (1 << k)));
-    let doubt = |k: usize| {
-        if sheets[k].is_nearly_flat(half) {
-            sheets[k].band(half)
-        } else {
-            sides.element_product()
+
+    /// Whether any point may change sides of the solid with sheet `k`.
+    fn matters(&self, k: usize) -> bool {
+        let mut all = 0..1_usize << self.sheets.len();
+        all.any(|c| self.holds(c) != self.holds(c ^ (1 << k)))
+    }
+
+    /// The share of the cell inside the terms.
+    fn share(&self, voxel: &Voxel, centre: DVec3, sides: DVec3) -> f64 {
+        if self.sheets.len() > MOST_SHEETS {
+            return 0.5;
         }
-    };
-    let doubts: f64 = (0..sheets.len()).filter(|&k| matters(k)).map(doubt).sum();
-    [volume, doubts].map(|v| (v / sides.element_product()).clamp(0.0, 1.0))
+        let (half, kept) = (0.5 * sides, 1_usize << self.kept);
+        let volume = sides.element_product();
+        let mut share = 0.0;
+        for outer in (0..1_usize << self.sheets.len()).filter(|c| c & kept == 0) {
+            let (without, with) = (self.holds(outer), self.holds(outer | kept));
+            if !(with || without) {
+                continue;
+            }
+            let spaces: SmallVec<[HalfSpace; MOST_SHEETS]> = (0..self.sheets.len())
+                .filter(|&k| k != self.kept)
+                .map(|k| self.sheets[k].half_space(outer >> k & 1 == 1, 0.0))
+                .collect();
+            let all = box_volume_within(half, &spaces) / volume;
+            let body = self.sheets[self.kept].body;
+            share += match (with, without) {
+                (true, true) => all,
+                _ if all == 0.0 => 0.0,
+                (true, false) => voxel.alone(body, centre, sides, &spaces),
+                _ => all - voxel.alone(body, centre, sides, &spaces),
+            };
+        }
+        share.clamp(0.0, 1.0)
+    }
 }
 
 /// The bodies of the terms, in order.
@@ -242,38 +360,35 @@ fn bodies_of(terms: &[Term]) -> Vec<usize> {
 
 /// The share of a voxel inside a union of terms.
 pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3) -> f64 {
-    let whole = sides.element_product();
+    let voxel = Voxel {
+        assembly,
+        terms,
+        volume: sides.element_product(),
+    };
     let bodies = bodies_of(terms);
-    let cell_of = |centre, sides| Cell::new(assembly, terms, centre, sides, whole);
     let mut heap = BinaryHeap::new();
     let mut doubt = 0.0;
     for (centre, sides) in flat_faces_apart(assembly, &bodies, centre, sides) {
-        let cell = cell_of(centre, sides);
+        let cell = voxel.cell(centre, sides);
         doubt += cell.doubt;
         heap.push(cell);
     }
     let most = (2 * CELLS / bodies.len()).max(64);
-    while doubt > DOUBT * whole && heap.len() < most {
+    while doubt > DOUBT * voxel.volume && heap.len() < most {
         let Some(cell) = heap.pop() else { break };
         doubt -= cell.doubt;
         let half = cell.sides * 0.5;
         for n in 0..8 {
             let side = |bit: u32| if n >> bit & 1 == 1 { 0.5 } else { -0.5 };
             let at = cell.centre + half * DVec3::new(side(0), side(1), side(2));
-            let part = cell_of(at, half);
+            let part = voxel.cell(at, half);
             doubt += part.doubt;
             heap.push(part);
         }
     }
-    // In a fixed order, so that the sum does not depend on the heap's.
-    let mut cells = heap.into_vec();
-    cells.sort_by(|a, b| {
-        a.centre
-            .to_array()
-            .map(f64::to_bits)
-            .cmp(&b.centre.to_array().map(f64::to_bits))
-    });
-    (cells.iter().map(|c| c.inside).sum::<f64>() / whole).clamp(0.0, 1.0)
+    let cells = heap.into_sorted_vec();
+    let inside: f64 = cells.iter().map(|c| voxel.inside(c)).sum();
+    (inside / voxel.volume).clamp(0.0, 1.0)
 }
 
 /// Cuts a voxel at the flat faces normal to a grid axis, where faces of two bodies may coincide

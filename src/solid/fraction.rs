@@ -21,6 +21,7 @@ use super::body::Body;
 use super::turn::Turn;
 use crate::math::bernstein;
 use crate::math::disc::{self, Polygon};
+use crate::math::tetrahedra::HalfSpace;
 use crate::math::{Real, Similarity, quadrature};
 use crate::region::BoundaryPiece;
 use glam::{DVec2, DVec3};
@@ -124,6 +125,39 @@ fn on_edge(corners: &[DVec3; 8], [i, j]: [usize; 2], z: f64) -> DVec2 {
     DVec2::new(a.x + (b.x - a.x) * s, a.y + (b.y - a.y) * s)
 }
 
+/// A half-space in a solid's frame, from the voxel's centre.
+#[derive(Debug, Clone, Copy)]
+struct Clip {
+    normal: DVec3,
+    offset: f64,
+}
+
+impl Clip {
+    /// Whether it leaves the same of every height.
+    fn is_upright(&self) -> bool {
+        self.normal.z.abs() <= 1e-13 * self.normal.length()
+    }
+
+    /// What the half-space leaves of a cross-section at height `z` above the voxel's centre.
+    fn of(&self, polygon: &Polygon, z: f64, centre: DVec2) -> Polygon {
+        let normal = DVec2::new(self.normal.x, self.normal.y);
+        let offset = self.offset - self.normal.z * z + normal.dot(centre);
+        let height = |p: DVec2| normal.dot(p) - offset;
+        let mut left = Polygon::new();
+        for (i, &a) in polygon.iter().enumerate() {
+            let b = polygon[(i + 1) % polygon.len()];
+            let (ha, hb) = (height(a), height(b));
+            if ha <= 0.0 {
+                left.push(a);
+            }
+            if (ha <= 0.0) != (hb <= 0.0) {
+                left.push(a + (b - a) * (ha / (ha - hb)));
+            }
+        }
+        left
+    }
+}
+
 /// Convex parts of a cross-section within the turn, with their signs.
 type Sections = SmallVec<[(Polygon, f64); 2]>;
 
@@ -171,6 +205,7 @@ struct Cell<'a> {
     z: f64,
     turn: &'a Turn,
     reach: Reach,
+    clips: SmallVec<[Clip; 4]>,
     /// Error allowed to one stretch of a piece, in local volume.
     tolerance: f64,
 }
@@ -179,6 +214,18 @@ impl Body {
     /// The share of the voxel centred on `centre` that the solid fills, between 0 and 1, each
     /// stretch of the profile within an estimated error of `tolerance`.
     pub(crate) fn fraction(&self, shape: &CellShape, centre: DVec3, tolerance: f64) -> f64 {
+        self.fraction_within(shape, centre, &[], tolerance)
+    }
+
+    /// The share of the voxel that lies in the solid and in all the half-spaces, which are given
+    /// from the voxel's centre.
+    pub(crate) fn fraction_within(
+        &self,
+        shape: &CellShape,
+        centre: DVec3,
+        spaces: &[HalfSpace],
+        tolerance: f64,
+    ) -> f64 {
         let c = self.frame().to_local(centre).point;
         let flat = DVec2::new(c.x, c.y);
         let mut reach = Reach::Whole;
@@ -202,6 +249,7 @@ impl Body {
             z: c.z,
             turn: self.turn(),
             reach,
+            clips: spaces.iter().map(|s| self.clip(s)).collect(),
             tolerance: tolerance * shape.volume,
         };
         let volume: f64 = (0..shape.slabs.len())
@@ -217,11 +265,30 @@ impl Body {
         }
     }
 
+    /// A half-space in the solid's frame and unit.
+    fn clip(&self, space: &HalfSpace) -> Clip {
+        let scale = self.frame().scale();
+        // The frame turns and scales: a normal goes as a vector does, but for the length.
+        Clip {
+            normal: self.frame().vector_to_local(space.normal) * scale,
+            offset: space.offset / scale,
+        }
+    }
+
+    /// The volume between two heights of corners, in parts within which the half-spaces meet the
+    /// same edges.
     fn slab_volume(&self, cell: &Cell, slab: usize) -> f64 {
+        let mut heights = cell.meetings(slab);
+        heights.extend([cell.shape.heights[slab], cell.shape.heights[slab + 1]]);
+        heights.sort_by(f64::total_cmp);
+        let parts = heights.windows(2).filter(|h| h[0] < h[1]);
+        parts.map(|h| self.part_volume(cell, slab, h)).sum()
+    }
+
+    fn part_volume(&self, cell: &Cell, slab: usize, heights: &[f64]) -> f64 {
         let (shape, z) = (cell.shape, cell.z);
-        let (bottom, top) = (shape.heights[slab], shape.heights[slab + 1]);
-        let fixed = shape
-            .upright
+        let (bottom, top) = (heights[0], heights[1]);
+        let fixed = (shape.upright && cell.clips.iter().all(Clip::is_upright))
             .then(|| cell.sections(slab, z + 0.5 * (bottom + top)));
         let half = shape.half_diagonal();
         let (near, far) = (
@@ -251,7 +318,13 @@ impl Body {
                 * match (beyond, &radii) {
                     (true, Some(_)) => (high - low) * area(2.0 * far, low),
                     // The polygon's area is quadratic in z: one panel is exact.
-                    (true, None) => quadrature::panel(&mut |h| area(2.0 * far, h), low, high).value,
+                    (true, None) if cell.clips.len() < 2 => {
+                        quadrature::panel(&mut |h| area(2.0 * far, h), low, high).value
+                    }
+                    (true, None) => {
+                        let whole = |h: f64| area(2.0 * far, h);
+                        quadrature::integrate(whole, low, high, cell.tolerance, 256).value
+                    }
                     (false, Some(radii)) => {
                         let stretch = Stretch::new(part, low, high);
                         stretch.volume(&stretch.at_radii(radii), cell.tolerance, &area)
@@ -267,13 +340,35 @@ impl Body {
 }
 
 impl Cell<'_> {
-    /// The cross-section at height `h`, within the turn.
+    /// Heights, within a slab and from the centre, at which a half-space's plane meets an edge.
+    fn meetings(&self, slab: usize) -> Vec<f64> {
+        let corners = &self.shape.corners;
+        let (low, high) = (self.shape.heights[slab], self.shape.heights[slab + 1]);
+        let mut heights = Vec::new();
+        for clip in self.clips.iter().filter(|c| !c.is_upright()) {
+            for [i, j] in EDGES {
+                let (a, b) = (corners[i], corners[j]);
+                let off = |p: DVec3| clip.normal.dot(p) - clip.offset;
+                let (from, to) = (off(a), off(b));
+                if (from <= 0.0) != (to <= 0.0) {
+                    let height = a.z + (b.z - a.z) * (from / (from - to));
+                    if height > low && height < high {
+                        heights.push(height);
+                    }
+                }
+            }
+        }
+        heights
+    }
+
+    /// The cross-section at height `h`, within the turn and the half-spaces.
     fn sections(&self, slab: usize, h: f64) -> Sections {
-        within_turn(
-            self.shape.polygon(slab, h - self.z, self.flat),
-            self.turn,
-            self.reach,
-        )
+        let z = h - self.z;
+        let mut polygon = self.shape.polygon(slab, z, self.flat);
+        for clip in &self.clips {
+            polygon = clip.of(&polygon, z, self.flat);
+        }
+        within_turn(polygon, self.turn, self.reach)
     }
 }
 
