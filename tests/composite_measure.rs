@@ -258,7 +258,6 @@ fn crossing_bars() {
 
 /// Balls of radius 2 at the origin and 1.5 at (2, 0, 0), their axes apart; they meet at x = 1.4375.
 #[test]
-#[ignore = "open: bounds of a composite on an edge are off by 1e-8 of its size"]
 fn two_balls() {
     let mut failures = String::new();
     let (a, b) = (ball(2.0), ball(1.5));

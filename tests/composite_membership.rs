@@ -280,7 +280,6 @@ fn no_sheet_is_left_on_a_cap_that_a_coaxial_solid_cuts() {
 
 /// What is left of a bar beyond a flat cap has sharp edges: they belong to it.
 #[test]
-#[ignore = "open: points exactly on acute edges, within the rounding band"]
 fn acute_edges_belong_to_the_solid() {
     let case = Case::new(Composite::new(
         "bar less a larger one across",

@@ -176,35 +176,53 @@ impl Assembly {
             let offset = |d: u32| f64::from(n / d % 3) - 1.0;
             DVec3::new(offset(1), offset(3), offset(9))
         });
-        // The middle of the normals of all faces, and of each two, is within the sharpest edge.
-        let all = inward.iter().copied().sum::<DVec3>();
+        // At a reflex edge of one body the faces need not hold the direction all together.
         let pairs = (0..inward.len())
             .flat_map(|i| (0..i).map(move |j| (i, j)))
             .map(|(i, j)| inward[i] + inward[j]);
-        let middles = pairs.chain([all]).filter_map(DVec3::try_normalize);
+        let middles = pairs.chain(within_all(&inward));
+        let middles = middles.filter_map(DVec3::try_normalize);
         let mut directions = lattice.chain(middles);
         directions.any(|d| interior(point + step * d))
     }
 
-    /// Unit normals into the factors of a term that meet at the point, from differences of their
-    /// distances nearby.
+    /// Unit normals, into the factors of a term, of the faces that meet at the point, from
+    /// differences of the factors' distances nearby.
     fn inward(&self, term: &Term, point: DVec3, size: f64) -> Vec<DVec3> {
         let near = 1e-6 * size;
-        let meeting = term
-            .factors
-            .iter()
-            .filter(|f| self.bodies[f.body].side(point) == Side::On);
-        let normal = |f: &Factor| {
+        let mut normals: Vec<DVec3> = Vec::new();
+        for f in &term.factors {
             let body = &self.bodies[f.body];
+            if body.side(point) != Side::On {
+                continue;
+            }
             let depth = |p: DVec3| {
                 let side = body.side(p);
                 let d = body.distance(p, side != Side::Outside, f64::INFINITY);
                 if f.side(side) == Side::Inside { d } else { -d }
             };
-            let across = DVec3::AXES.map(|e| depth(point + near * e) - depth(point - near * e));
-            DVec3::from_array(across).try_normalize()
-        };
-        meeting.filter_map(normal).collect()
+            let slope = |p: DVec3, by: f64| {
+                let across = DVec3::AXES.map(|e| depth(p + by * e) - depth(p - by * e));
+                DVec3::from_array(across) / (2.0 * by)
+            };
+            let mut add = |slope: DVec3| {
+                // Between two faces the slope is neither's.
+                let smooth = (slope.length() - 1.0).abs() < 1e-3;
+                if smooth && normals.iter().all(|n| n.dot(slope) < 1.0 - 1e-3) {
+                    normals.push(slope.normalize());
+                }
+                smooth
+            };
+            if !add(slope(point, near)) {
+                // On an edge of the body itself: each face is the nearest one somewhere around.
+                for n in (0..27_u32).filter(|n| *n != 13) {
+                    let offset = |d: u32| f64::from(n / d % 3) - 1.0;
+                    let around = DVec3::new(offset(1), offset(3), offset(9));
+                    add(slope(point + near * around, 1e-2 * near));
+                }
+            }
+        }
+        normals
     }
 
     /// The material at the point: that of the last added part holding it, 0 outside.
@@ -397,6 +415,23 @@ impl Assembly {
             others.into_iter().all(|f| firmly(f, Side::Inside))
         }
     }
+}
+
+/// A direction on the positive side of all normals, if there is one that is not too narrow: the
+/// normal that is missed most is added until none is missed.
+fn within_all(normals: &[DVec3]) -> Option<DVec3> {
+    const STEPS: usize = 1000;
+    let mut direction: DVec3 = normals.iter().sum();
+    for _ in 0..STEPS {
+        let along = normals.iter().map(|n| (n.dot(direction), n));
+        let (least, missed) = along.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        // Well within: the points asked are a few roundings away.
+        if least > 0.2 * direction.length() {
+            break;
+        }
+        direction += *missed;
+    }
+    Some(direction)
 }
 
 /// The signed form of an unsigned distance.

@@ -26,6 +26,9 @@ const TOLERANCE: f64 = 1e-12;
 const MOST_BEGUN: usize = 300_000;
 /// Stretches of circles looked at after which the estimates are taken as they are: half a minute's work.
 const MOST_WORK: u64 = 40_000_000;
+/// Stretches after which a round of panels is given up: where surfaces nearly coincide each of its
+/// circles takes thousands.
+const MOST_OF_A_ROUND: u64 = 3 * MOST_WORK;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 /// Places of the quantities.
@@ -113,16 +116,36 @@ struct Panel {
     sheet: Sheet,
     range: [f64; 2],
     integrals: [Integral; QUANTITIES],
+    /// For each direction the furthest circle looked at: how far it reaches, and its parameter.
+    furthest: [(f64, f64); 6],
 }
 
 impl Panel {
     fn new(faces: &Faces, sheet: Sheet, range: [f64; 2]) -> Self {
-        let integrals = panel_of(&mut |t| faces.flux(sheet, t), range[0], range[1]);
+        let mut furthest = [(f64::NEG_INFINITY, range[0]); 6];
+        let mut flux = |t| {
+            let (flux, extremes) = faces.flux_and_extremes(sheet, t);
+            for (best, reach) in furthest.iter_mut().zip(extremes) {
+                if reach > best.0 {
+                    *best = (reach, t);
+                }
+            }
+            flux
+        };
+        let integrals = panel_of(&mut flux, range[0], range[1]);
         Self {
             sheet,
             range,
             integrals,
+            furthest,
         }
+    }
+
+    /// Whether the other goes on where this one ends.
+    fn is_followed_by(&self, other: &Self) -> bool {
+        #[allow(clippy::float_cmp, reason = "halving keeps the ends")]
+        let meets = self.range[1] == other.range[0];
+        meets && self.sheet.number() == other.sheet.number()
     }
 
     fn halves(&self) -> [(Sheet, [f64; 2]); 2] {
@@ -201,13 +224,15 @@ fn about(bodies: &[Arc<Body>], terms: &[Term], centre: DVec3) -> (Vec<Arc<Body>>
 /// Panels whose estimated errors sum to the tolerances, or the best there is; `None` where even the
 /// first are too many.
 fn integrated(faces: &Faces, size: f64) -> Option<Vec<Panel>> {
-    let make = |work: Vec<(Sheet, [f64; 2])>| -> Vec<Panel> {
+    // `None` where the round is given up. Whether it is does not depend on the order of the work.
+    let make = |work: Vec<(Sheet, [f64; 2])>| -> Option<Vec<Panel>> {
+        let most = faces.work() + MOST_OF_A_ROUND;
         let panels = work.into_par_iter();
         panels
-            .map(|(s, range)| Panel::new(faces, s, range))
+            .map(|(s, range)| (faces.work() <= most).then(|| Panel::new(faces, s, range)))
             .collect()
     };
-    let mut panels = make(faces.sheets(MOST_BEGUN)?);
+    let mut panels = make(faces.sheets(MOST_BEGUN)?)?;
     loop {
         let tolerances = tolerances(&panels, size);
         let mut order: Vec<(f64, usize)> = panels
@@ -239,11 +264,14 @@ fn integrated(faces: &Faces, size: f64) -> Option<Vec<Panel>> {
             return Some(panels);
         }
         chosen.sort_unstable();
-        let mut halves = Vec::new();
+        let halves = chosen.iter().flat_map(|&i| panels[i].halves()).collect();
+        let Some(halves) = make(halves) else {
+            return Some(panels);
+        };
         for &i in chosen.iter().rev() {
-            halves.extend(panels.swap_remove(i).halves());
+            panels.swap_remove(i);
         }
-        panels.extend(make(halves));
+        panels.extend(halves);
     }
 }
 
@@ -302,18 +330,12 @@ fn moments(total: &[Integral; QUANTITIES], centre: DVec3) -> Moments {
 /// The largest coordinate lies on a body's own bound where that is on the composite's boundary,
 /// else on an edge: the best stretches are refined until their extremes stand still.
 fn extremes(faces: &Faces, panels: &[Panel], centre: DVec3, size: f64) -> Option<Aabb> {
-    let visible: Vec<&Panel> = panels
-        .iter()
-        .filter(|p| p.integrals[AREA].value != 0.0)
-        .collect();
-    let sampled: Vec<[f64; 6]> = visible
-        .par_iter()
-        .map(|p| faces.extremes(p.sheet, 0.5 * (p.range[0] + p.range[1])))
-        .collect();
     let best: [f64; 6] = std::array::from_fn(|k| {
-        let mut order: Vec<usize> = (0..visible.len()).collect();
-        order.sort_by(|&i, &j| sampled[j][k].total_cmp(&sampled[i][k]));
-        let top = order.first().map_or(f64::NEG_INFINITY, |&i| sampled[i][k]);
+        let mut order: Vec<usize> = (0..panels.len()).collect();
+        order.sort_by(|&i, &j| panels[j].furthest[k].0.total_cmp(&panels[i].furthest[k].0));
+        let top = order
+            .first()
+            .map_or(f64::NEG_INFINITY, |&i| panels[i].furthest[k].0);
         // A body's own bound is exact.
         let own = |value: f64| {
             let bounds = faces.bodies.iter().map(|b| b.bounds());
@@ -321,11 +343,8 @@ fn extremes(faces: &Faces, panels: &[Panel], centre: DVec3, size: f64) -> Option
             extents.find(|e| (e - value).abs() <= 1e-11 * size)
         };
         own(top).unwrap_or_else(|| {
-            let candidates: Vec<&Panel> =
-                order.iter().take(CANDIDATES).map(|&i| visible[i]).collect();
-            let refined = candidates
-                .into_par_iter()
-                .map(|p| highest(faces, p.sheet, p.range, k));
+            let candidates = order[..order.len().min(CANDIDATES)].par_iter();
+            let refined = candidates.map(|&i| highest_about(faces, panels, i, k));
             let value = refined.reduce(|| f64::NEG_INFINITY, f64::max);
             own(value).unwrap_or(value)
         })
@@ -336,15 +355,36 @@ fn extremes(faces: &Faces, panels: &[Panel], centre: DVec3, size: f64) -> Option
     })
 }
 
-/// The largest extreme along direction `k` of the circles of a stretch: golden section.
-fn highest(faces: &Faces, sheet: Sheet, [mut a, mut b]: [f64; 2], k: usize) -> f64 {
+/// The largest extreme along direction `k` about the furthest circle of panel `i`. The panels
+/// beside it are searched too: their points may all lie beyond the edge.
+fn highest_about(faces: &Faces, panels: &[Panel], i: usize, k: usize) -> f64 {
+    let panel = &panels[i];
+    let (value, at) = panel.furthest[k];
+    if value == f64::NEG_INFINITY {
+        return value;
+    }
+    let before = panels[..i].last().filter(|p| p.is_followed_by(panel));
+    let after = panels.get(i + 1).filter(|p| panel.is_followed_by(p));
+    let low = before.unwrap_or(panel).range[0];
+    let high = after.unwrap_or(panel).range[1];
+    let down = highest(faces, panel.sheet, [at, low], k);
+    let up = highest(faces, panel.sheet, [at, high], k);
+    value.max(down).max(up)
+}
+
+/// The largest extreme along direction `k` of the circles from a visible one to another parameter,
+/// as far as they are visible: golden section.
+fn highest(faces: &Faces, sheet: Sheet, [from, to]: [f64; 2], k: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let value = |t: f64| faces.extremes(sheet, t)[k];
-    let mut best = value(a).max(value(b));
-    let (mut s, mut t) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+    // In parameters from 0, where the circle is visible, to 1.
+    let value = |x: f64| faces.extremes(sheet, from + (to - from) * x)[k];
+    let (mut a, mut b) = (0.0_f64, 1.0_f64);
+    let mut best = value(b);
+    let (mut s, mut t) = (1.0 - GOLDEN, GOLDEN);
     let (mut vs, mut vt) = (value(s), value(t));
     for _ in 0..80 {
         best = best.max(vs).max(vt);
+        // Where neither is visible the edge is nearer to the visible end.
         if vs >= vt {
             (b, t, vt) = (t, s, vs);
             s = b - GOLDEN * (b - a);

@@ -168,20 +168,22 @@ impl Faces {
         })
     }
 
-    /// The quantities per unit of the piece's parameter.
-    pub(super) fn flux(&self, sheet: Sheet, t: f64) -> Flux {
+    /// The quantities per unit of the piece's parameter, and the [`extremes`](Self::extremes).
+    pub(super) fn flux_and_extremes(&self, sheet: Sheet, t: f64) -> (Flux, [f64; 6]) {
         let mut flux = [0.0; QUANTITIES];
+        let mut extremes = [f64::NEG_INFINITY; 6];
         let Some(rule) = self.rule(sheet, t) else {
-            return flux;
+            return (flux, extremes);
         };
         let edges = self.visible(sheet, &rule, &mut |range, sign| {
             add_flux(&rule, range, sign, &mut flux);
+            add_extremes(&rule, range, &mut extremes);
         });
         #[allow(clippy::cast_precision_loss, reason = "a count of crossings")]
         let edges = edges as f64;
         flux[QUANTITIES - 1] =
             edges * self.bodies[sheet.body].frame().scale() * self.pace(sheet, t);
-        flux
+        (flux, extremes)
     }
 
     /// The largest coordinates along the six directions +x, +y, +z, -x, -y, -z.
@@ -189,9 +191,7 @@ impl Faces {
         let mut extremes = [f64::NEG_INFINITY; 6];
         if let Some(rule) = self.rule(sheet, t) {
             self.visible(sheet, &rule, &mut |range, _| {
-                for (k, best) in extremes.iter_mut().enumerate() {
-                    *best = best.max(rule.path.support(direction(k), range));
-                }
+                add_extremes(&rule, range, &mut extremes);
             });
         }
         extremes
@@ -381,6 +381,12 @@ const GAUSS: [(f64, f64); 5] = [
     (0.865_063_366_688_984_5, 0.149_451_349_150_580_6),
     (0.973_906_528_517_171_7, 0.066_671_344_308_688_14),
 ];
+
+fn add_extremes(rule: &Rule, range: [f64; 2], extremes: &mut [f64; 6]) {
+    for (k, best) in extremes.iter_mut().enumerate() {
+        *best = best.max(rule.path.support(direction(k), range));
+    }
+}
 
 /// Adds the integrals over a stretch. Along a circle they are trigonometric polynomials of degree
 /// 4, along a line polynomials: eight points of a whole circle, or ten of a quarter, are exact.
