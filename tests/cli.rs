@@ -592,6 +592,48 @@ fn info_verifies_and_finds_what_is_wrong() {
     run(&["info", &out]).exits(3);
 }
 
+/// Each material has its voxels, and its volume beside the exact one.
+#[test]
+fn info_shows_the_materials() {
+    let t = scratch();
+    let out = below(&t, "out");
+    run(&[
+        "voxelize",
+        &shipped("two_material_tank"),
+        "-o",
+        &out,
+        "--resolution",
+        "40",
+    ])
+    .exits(0);
+    let d = run(&["info", &out, "--json"]).exits(0).json();
+    let materials = d["material_volumes"].as_array().expect("a list");
+    assert_eq!(materials.len(), 2);
+    let inside: u64 = materials.iter().filter_map(|m| m["voxels"].as_u64()).sum();
+    assert_eq!(Some(inside), d["voxels_inside"].as_u64());
+    let sum: f64 = materials
+        .iter()
+        .filter_map(|m| m["volume_exact"].as_f64())
+        .sum();
+    let whole = d["volume_exact"].as_f64().expect("a volume");
+    assert!((sum - whole).abs() < 1e-12 * whole, "{sum} for {whole}");
+    for m in materials {
+        let name = m["name"].as_str().expect("a name");
+        let (exact, sampled) = (&m["volume_exact"], &m["volume_occupancy"]);
+        let text = run(&["info", &out]).exits(0).out;
+        let line = text
+            .lines()
+            .find(|l| l.starts_with("material") && l.contains(name));
+        let line = line.unwrap_or_else(|| panic!("{text}"));
+        for value in [exact, sampled] {
+            let value = value.as_f64().expect("a number").to_string();
+            assert!(line.contains(&value), "{line}: {value}");
+        }
+    }
+    let near = d["certainty"]["within_three_voxels"]["exact_share"].as_f64();
+    assert_eq!(near, Some(1.0));
+}
+
 #[test]
 fn generated_texts_are_what_they_say() {
     let schema = run(&["generate", "schema"]).exits(0).json();

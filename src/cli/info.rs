@@ -3,8 +3,8 @@
 use super::arguments::{Common, Info};
 use super::failure::Failure;
 use super::output::{self, Console};
-use crate::io::verify_stack;
-use serde_json::json;
+use crate::io::{Manifest, verify_stack};
+use serde_json::{Value, json};
 use std::fmt::Write;
 use std::process::ExitCode;
 
@@ -37,63 +37,15 @@ pub(super) fn run(
         "volume_exact": m.volume_exact,
         "solids": m.solids,
         "materials": m.materials,
+        "material_volumes": m.material_volumes,
+        "certainty": m.certainty,
         "warnings": m.warnings,
         "missing": report.missing,
         "altered": altered,
         "extra": report.extra,
         "ok": report.is_intact(),
     });
-    let mut text = String::new();
-    let [nx, ny, nz] = m.grid.dims;
-    let unknown = || "unknown".to_owned();
-    let volume = |v: Option<f64>| v.map_or_else(unknown, |v| format!("{v} {}^3", m.units));
-    // Writing to a string does not fail.
-    let _ = writeln!(
-        text,
-        "scene        {}",
-        m.scene_name.as_deref().unwrap_or("unnamed")
-    );
-    let _ = writeln!(
-        text,
-        "grid         {nx} x {ny} x {nz} voxels of {:?} {}",
-        m.grid.spacing, m.units
-    );
-    let _ = writeln!(text, "origin       {:?}", m.grid.origin);
-    for c in &m.channels {
-        let range = c.range.map_or_else(unknown, |[a, b]| format!("{a} to {b}"));
-        let _ = writeln!(
-            text,
-            "channel      {:<10} {range}{}  {}",
-            c.name,
-            c.unit
-                .as_ref()
-                .map_or_else(String::new, |u| format!(" {u}")),
-            c.meaning
-        );
-    }
-    let _ = writeln!(
-        text,
-        "inside       {} voxels",
-        m.voxels_inside.map_or_else(unknown, |v| v.to_string())
-    );
-    let _ = writeln!(
-        text,
-        "volume       {} by occupancy",
-        volume(m.volume_occupancy)
-    );
-    let _ = writeln!(
-        text,
-        "             {} by fraction",
-        volume(m.volume_fraction)
-    );
-    let _ = writeln!(text, "             {} exact", volume(m.volume_exact));
-    let _ = writeln!(
-        text,
-        "files        {}, {}, {}",
-        m.files.len(),
-        output::bytes(total),
-        m.compression
-    );
+    let mut text = holdings(m);
     let damaged = report.missing.iter().map(|n| format!("missing      {n}\n"));
     let damaged = damaged.chain(altered.iter().map(|n| format!("altered      {n}\n")));
     text.extend(damaged.chain(report.extra.iter().map(|n| format!("not listed   {n}\n"))));
@@ -114,4 +66,74 @@ pub(super) fn run(
         console.say("error: the stack is not what its manifest lists; write it again, or restore the files named above");
         Ok(ExitCode::from(1))
     }
+}
+
+/// What a stack holds, as text.
+fn holdings(m: &Manifest) -> String {
+    let mut lines: Vec<[String; 2]> = Vec::new();
+    let mut line = |name: &str, value: String| lines.push([name.to_owned(), value]);
+    let unknown = || "unknown".to_owned();
+    let volume = |v: Option<f64>| v.map_or_else(unknown, |v| format!("{v} {}^3", m.units));
+    let [nx, ny, nz] = m.grid.dims;
+    let name = m.scene_name.as_deref().unwrap_or("unnamed");
+    line("scene", name.to_owned());
+    let voxels = format!("{nx} x {ny} x {nz} voxels");
+    line(
+        "grid",
+        format!("{voxels} of {:?} {}", m.grid.spacing, m.units),
+    );
+    line("origin", format!("{:?}", m.grid.origin));
+    for c in &m.channels {
+        let range = c.range.map_or_else(unknown, |[a, b]| format!("{a} to {b}"));
+        let unit = c
+            .unit
+            .as_ref()
+            .map_or_else(String::new, |u| format!(" {u}"));
+        line(
+            "channel",
+            format!("{:<10} {range}{unit}  {}", c.name, c.meaning),
+        );
+    }
+    let inside = m.voxels_inside.map_or_else(unknown, |v| v.to_string());
+    line("inside", format!("{inside} voxels"));
+    line(
+        "volume",
+        format!("{} by occupancy", volume(m.volume_occupancy)),
+    );
+    line("", format!("{} by fraction", volume(m.volume_fraction)));
+    line("", format!("{} exact", volume(m.volume_exact)));
+    for one in &m.material_volumes {
+        let name = one
+            .name
+            .as_ref()
+            .map_or_else(String::new, |n| format!(" {n:?}"));
+        let sampled = one.voxels.map_or_else(String::new, |n| {
+            format!(
+                "{n} voxels, {} by occupancy, ",
+                volume(one.volume_occupancy)
+            )
+        });
+        let exact = volume(one.volume_exact);
+        line(
+            "material",
+            format!("{}{name}: {sampled}{exact} exact", one.id),
+        );
+    }
+    let count = |pointer: &str| m.certainty.pointer(pointer).and_then(Value::as_u64);
+    if let (Some(exact), Some(bounds)) = (count("/exact"), count("/lower_bound")) {
+        let near = m.certainty.pointer("/within_three_voxels/exact_share");
+        let near = near.and_then(Value::as_f64).unwrap_or(1.0);
+        let share = format!("{near:.4} of those within three voxels exact");
+        line(
+            "distances",
+            format!("{exact} exact, {bounds} lower bounds; {share}"),
+        );
+    }
+    let total: u64 = m.files.iter().map(|f| f.bytes).sum();
+    let files = format!("{}, {}", m.files.len(), output::bytes(total));
+    line("files", format!("{files}, {}", m.compression));
+    lines
+        .iter()
+        .map(|[name, value]| format!("{name:<12} {value}\n"))
+        .collect()
 }

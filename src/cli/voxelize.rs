@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::grid::GridSpec;
 use crate::io::available_bytes;
 use crate::io::exr::{Compression, LayerChannels, SampleKind};
-use crate::io::manifest::Manifest;
+use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
 };
@@ -437,7 +437,7 @@ fn certainty(count: &Certainty) -> Value {
 }
 
 /// What each material takes of the solid.
-fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<Value> {
+fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<MaterialVolume> {
     let voxel = plan.grid.spacing().element_product();
     let mut ids: Vec<u32> = scene
         .assembly()
@@ -454,13 +454,13 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<Value> {
         let volume = sampled.map(|n| n as f64 * voxel);
         let part = scene.assembly().of_material(id);
         let exact = part.and_then(|m| Some(m.moments()?.volume.value));
-        json!({
-            "id": id,
-            "name": scene.model().materials.get(&id),
-            "voxels": sampled,
-            "volume_occupancy": volume,
-            "volume_exact": exact,
-        })
+        MaterialVolume {
+            id,
+            name: scene.model().materials.get(&id).cloned(),
+            voxels: sampled,
+            volume_occupancy: volume,
+            volume_exact: exact,
+        }
     };
     ids.into_iter().map(one).collect()
 }
@@ -487,7 +487,7 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
         warnings: warnings(scene),
-        material_volumes: Value::Array(material_volumes(scene, plan, tally)),
+        material_volumes: material_volumes(scene, plan, tally),
         certainty: if plan.selection.sdf {
             certainty(&tally.certainty)
         } else {

@@ -70,11 +70,27 @@ pub struct Manifest {
     /// What the user should know.
     pub warnings: Vec<String>,
     /// Voxels and volumes of each material.
-    pub material_volumes: serde_json::Value,
+    pub material_volumes: Vec<MaterialVolume>,
     /// Where the distance is exact and where a lower bound.
     pub certainty: serde_json::Value,
     /// The resolved scene.
     pub scene: serde_json::Value,
+}
+
+/// What one material takes of a solid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialVolume {
+    /// The id that voxels hold.
+    pub id: u32,
+    /// Its name, where it has one.
+    pub name: Option<String>,
+    /// Voxels whose centre it holds; counted where `material` is a channel.
+    pub voxels: Option<u64>,
+    /// Volume as `voxels` times the volume of a voxel, in cubed scene units.
+    pub volume_occupancy: Option<f64>,
+    /// Its volume in the solid itself, in cubed scene units.
+    pub volume_exact: Option<f64>,
 }
 
 /// The grid in a manifest; see [`GridSpec`].
@@ -195,6 +211,10 @@ impl Manifest {
         finite("volume_occupancy", self.volume_occupancy.as_slice())?;
         finite("volume_fraction", self.volume_fraction.as_slice())?;
         finite("volume_exact", self.volume_exact.as_slice())?;
+        for material in &self.material_volumes {
+            finite("volume_occupancy", material.volume_occupancy.as_slice())?;
+            finite("volume_exact", material.volume_exact.as_slice())?;
+        }
         for channel in &self.channels {
             finite("range", &channel.range.unwrap_or_default())?;
         }
@@ -356,7 +376,13 @@ pub(super) mod tests {
             solids: serde_json::Value::Null,
             materials: serde_json::json!({ "1": "glass" }),
             warnings: vec![],
-            material_volumes: serde_json::Value::Null,
+            material_volumes: vec![MaterialVolume {
+                id: 1,
+                name: Some("glass".to_owned()),
+                voxels: Some(12),
+                volume_occupancy: Some(1.5),
+                volume_exact: None,
+            }],
             certainty: serde_json::Value::Null,
             scene: serde_json::json!({ "schema": 1 }),
         }

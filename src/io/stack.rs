@@ -29,7 +29,8 @@ use super::exr::{
     encode_layer, layer_attributes,
 };
 use super::manifest::{
-    ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, SCHEMA, slice_name,
+    ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, MaterialVolume,
+    SCHEMA, slice_name,
 };
 use crate::grid::{GridSpec, Volume};
 
@@ -117,7 +118,7 @@ pub struct StackSummary {
     /// What the user should know.
     pub warnings: Vec<String>,
     /// Voxels and volumes of each material.
-    pub material_volumes: serde_json::Value,
+    pub material_volumes: Vec<MaterialVolume>,
     /// Where the distance is exact and where a lower bound.
     pub certainty: serde_json::Value,
     /// The resolved scene.
