@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use support::composite::{Case, Composite, Expected, ball, chain, coaxial, composites, cylinder};
 use support::sampling::Random;
+use voxlathe::solid::{Assembly, Operation};
 
 /// Points drawn by one generator.
 const CHUNK: usize = 128;
@@ -128,6 +129,76 @@ fn a_million_points_of_coaxial_composites() {
 fn points_of_a_hundred_chains() {
     let chains = (200..300).map(|seed| chain(seed, 3 + seed as usize % 12));
     check(chains.collect(), many() / 50);
+}
+
+/// The boolean of what the parts themselves answer.
+fn boolean(assembly: &Assembly, p: DVec3) -> bool {
+    assembly.parts().iter().fold(false, |inside, part| {
+        let own = part.contains(p);
+        match part.operation() {
+            Operation::Add => inside || own,
+            Operation::Subtract => inside && !own,
+            Operation::Intersect => inside && own,
+        }
+    })
+}
+
+/// Composites differ from the boolean of their parts' answers in the rounding band alone.
+fn parts_answer(all: Vec<Composite>, count: usize) {
+    let mut failures = String::new();
+    for composite in all {
+        let case = Case::new(composite);
+        let assembly = case.scene.assembly();
+        let meetings = case.meetings(3000, &mut Random::new(7));
+        let near = |p: DVec3| {
+            assembly.parts().iter().any(|part| {
+                let band = 8.0 * f64::EPSILON * (part.bounds().longest_side() + p.length());
+                let d = part.body().distance(p, part.contains(p), f64::INFINITY);
+                d <= band
+            })
+        };
+        let chunk = |index: usize| {
+            let mut random = Random::new(index as u64 + 1);
+            let points = (0..CHUNK).map(|_| case.point(&meetings, &mut random));
+            let different = points.filter(|&p| assembly.contains(p) != boolean(assembly, p));
+            let (near, wrong): (Vec<DVec3>, Vec<DVec3>) = different.partition(|&p| near(p));
+            (near.len(), wrong)
+        };
+        let (near, wrong) = (0..count.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(chunk)
+            .reduce(Default::default, |mut a, b| {
+                a.0 += b.0;
+                a.1.extend(b.1);
+                a
+            });
+        let name = &case.composite.name;
+        eprintln!(
+            "{name:60} {count:8} points, {near:6} decided in the rounding band, {} wrong",
+            wrong.len()
+        );
+        if let Some(p) = wrong.first() {
+            failures += &format!(
+                "{name}: {} wrong, {:?} for one\n",
+                wrong.len(),
+                p.to_array()
+            );
+        }
+    }
+    assert!(failures.is_empty(), "{failures}");
+}
+
+#[test]
+fn what_the_parts_answer() {
+    parts_answer(composites(), 5000);
+    parts_answer(coaxial(), 5000);
+}
+
+#[test]
+#[ignore = "minutes long: run in release"]
+fn what_the_parts_answer_at_a_million_points() {
+    parts_answer(composites(), many());
+    parts_answer(coaxial(), many());
 }
 
 fn assert_points(case: &Case, points: &[([f64; 3], bool)]) {
