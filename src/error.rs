@@ -43,6 +43,11 @@ pub enum Error {
         /// What would do.
         wanted: &'static str,
     },
+    /// There is no volume to compare with.
+    #[error(
+        "the solid has no exact volume to compare with: nothing is left of it, or so many solids meet that measuring them would take minutes; name a closed form as [reference]"
+    )]
+    NoReference,
     /// A signal asked the run to stop.
     #[error("interrupted; nothing was left behind")]
     Interrupted,

@@ -27,6 +27,7 @@
 //!   row spans, volume fractions of voxels.
 //! * [`grid`]: where the voxels are; it knows no geometry.
 //! * [`sample`]: layers of occupancy, fraction, distance and material.
+//! * [`converge`]: how the samples approach the solid as voxels become smaller.
 //! * [`io`]: the EXR stack with its manifest, tables of points; it knows no geometry.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
 //!
@@ -41,6 +42,7 @@
 
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod converge;
 pub mod error;
 pub mod grid;
 pub mod io;

@@ -76,6 +76,8 @@ pub(super) enum Command {
     Query(Query),
     /// Exact volume, area, centroid, inertia tensor and bounds
     Measure(Measure),
+    /// Errors of volumes and distances over several resolutions, with fitted orders
+    Converge(Converge),
     /// Show what a finished stack holds, and verify its digests
     Info(Info),
     /// Write a manual page, shell completions or the schema of scene files to standard output
@@ -183,6 +185,40 @@ pub(super) struct Measure {
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
 }
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Volumes are compared with the exact one, distances as stored with those in f64; where the scene has a [reference],
+everything is compared with that closed form. The volume by occupancy is a lattice count, so its order is fitted to the
+mean over grids moved by parts of a voxel.
+
+Example: voxlathe converge scenes/torus.toml --resolutions 16,32,64,128 -o out/convergence")]
+pub(super) struct Converge {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// Voxels along the longest side, one grid for each
+    #[arg(
+        long,
+        value_name = "N,M",
+        value_delimiter = ',',
+        default_value = "16,32,64,128,256",
+        value_parser = clap::value_parser!(u32).range(1..=MOST_CONVERGED)
+    )]
+    pub(super) resolutions: Vec<u32>,
+    /// Moved grids that the error by occupancy is averaged over
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=4096))]
+    pub(super) offsets: u32,
+    /// Directory for converge.csv and converge.png
+    #[arg(long, short, value_name = "DIR")]
+    pub(super) output: Option<PathBuf>,
+    /// Replace the two files in DIR
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+/// Largest resolution of `converge`: its layers are held whole.
+const MOST_CONVERGED: i64 = 4096;
 
 #[derive(Debug, Args)]
 #[command(after_help = "Exit code 1 when a file is missing or its digest differs.")]

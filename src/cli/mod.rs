@@ -3,6 +3,7 @@
 //! Results go to standard output, everything meant for people while it runs to standard error.
 
 mod arguments;
+mod converge;
 mod failure;
 mod generate;
 mod info;
@@ -59,6 +60,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Voxelize(a) => voxelize::run(a, common, console),
         Command::Query(a) => query::run(a, common, console),
         Command::Measure(a) => measure::run(a, common, console),
+        Command::Converge(a) => converge::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }

@@ -2,14 +2,14 @@
 
 use super::error::SceneError;
 use super::model::{
-    self, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel, SolidKind,
-    SolidModel,
+    self, AxisModel, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel,
+    SolidKind, SolidModel,
 };
 use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
 use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region, RegionError};
-use crate::solid::{Assembly, Measures, Operation, Part, Turn};
+use crate::solid::{Analytic, Assembly, Measures, Operation, Part, Turn};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,6 +35,7 @@ use std::sync::{Arc, OnceLock};
 pub struct Scene {
     model: SceneModel,
     assembly: Assembly,
+    reference: Option<Analytic>,
     volume: OnceLock<Option<f64>>,
     warnings: Vec<String>,
 }
@@ -103,8 +104,13 @@ impl Scene {
                 }),
             );
         }
+        let reference = model.reference.as_ref().map(|r| {
+            let frame = frame(&model, &r.axis, &r.steps, "reference")?;
+            Ok::<_, Error>(Analytic::new(r.shape, frame))
+        });
         Ok(Self {
             assembly: Assembly::new(parts),
+            reference: reference.transpose()?,
             volume: OnceLock::new(),
             model,
             warnings,
@@ -132,6 +138,12 @@ impl Scene {
     #[must_use]
     pub fn assembly(&self) -> &Assembly {
         &self.assembly
+    }
+
+    /// The closed form that the scene names to be compared with.
+    #[must_use]
+    pub fn reference(&self) -> Option<&Analytic> {
+        self.reference.as_ref()
     }
 
     /// The smallest box around the added solids, in scene units.
@@ -441,33 +453,7 @@ fn part(model: &SceneModel, solid: &SolidModel, region: Arc<Region>) -> Result<P
     let SolidKind::Revolve {
         angle, start, axis, ..
     } = &solid.kind;
-    let direction = DVec3::from(axis.direction);
-    let x = axis.x.map_or_else(|| default_x(direction), DVec3::from);
-    let refused = |what: &str, wanted: &str| {
-        Error::from(model.error(
-            axis.place,
-            &format!("{}.axis", solid.path),
-            Some(what.to_owned()),
-            wanted,
-            None,
-        ))
-    };
-    let mut frame =
-        Similarity::from_axis(DVec3::from(axis.origin), direction, x).ok_or_else(|| {
-            refused(
-                "directions that span no frame",
-                "a direction that is not zero and an x that is not parallel to it",
-            )
-        })?;
-    for step in &solid.steps {
-        frame = match *step {
-            PlaceStep::Scale(s) => frame.scaled(s),
-            PlaceStep::Rotate { axis, degrees } => frame
-                .rotated(DVec3::from(axis), degrees)
-                .ok_or_else(|| refused("a rotation about nothing", "an axis that is not zero"))?,
-            PlaceStep::Translate(by) => frame.translated(DVec3::from(by)),
-        };
-    }
+    let frame = frame(model, axis, &solid.steps, &solid.path)?;
     let part = Part::new(
         solid.name.clone(),
         solid.material,
@@ -494,6 +480,38 @@ fn part(model: &SceneModel, solid: &SolidModel, region: Arc<Region>) -> Result<P
             .into());
     }
     Ok(part)
+}
+
+/// The frame of something about an axis, placed.
+fn frame(
+    model: &SceneModel,
+    axis: &AxisModel,
+    steps: &[PlaceStep],
+    path: &str,
+) -> Result<Similarity, Error> {
+    let direction = DVec3::from(axis.direction);
+    let x = axis.x.map_or_else(|| default_x(direction), DVec3::from);
+    let refused = |what: &str, wanted: &str| {
+        let (path, found) = (format!("{path}.axis"), Some(what.to_owned()));
+        Error::from(model.error(axis.place, &path, found, wanted, None))
+    };
+    let mut frame =
+        Similarity::from_axis(DVec3::from(axis.origin), direction, x).ok_or_else(|| {
+            refused(
+                "directions that span no frame",
+                "a direction that is not zero and an x that is not parallel to it",
+            )
+        })?;
+    for step in steps {
+        frame = match *step {
+            PlaceStep::Scale(s) => frame.scaled(s),
+            PlaceStep::Rotate { axis, degrees } => frame
+                .rotated(DVec3::from(axis), degrees)
+                .ok_or_else(|| refused("a rotation about nothing", "an axis that is not zero"))?,
+            PlaceStep::Translate(by) => frame.translated(DVec3::from(by)),
+        };
+    }
+    Ok(frame)
 }
 
 /// +x, or +y where the axis is within a degree of ±x.

@@ -10,6 +10,7 @@ pub(super) const SCENE: &[&str] = &[
     "materials",
     "profiles",
     "solid",
+    "reference",
 ];
 /// `[grid]`.
 pub(super) const GRID: &[&str] = &[
@@ -70,6 +71,17 @@ pub(super) const CURVES: &[(&str, &[&str])] = &[
 ];
 /// Kinds of solids with the keys of each.
 pub(super) const SOLIDS: &[(&str, &[&str])] = &[("revolve", SOLID)];
+
+/// Kinds of closed forms with the keys of each.
+pub(super) const REFERENCES: &[(&str, &[&str])] = &[
+    ("torus", &["kind", "major", "minor", "axis", "place"]),
+    ("cylinder", &["kind", "radius", "height", "axis", "place"]),
+    (
+        "cone",
+        &["kind", "radius1", "radius2", "height", "axis", "place"],
+    ),
+    ("sphere", &["kind", "radius", "axis", "place"]),
+];
 
 /// The candidate nearest to `word`, when one is near enough to be what was meant.
 pub(crate) fn nearest<'a>(

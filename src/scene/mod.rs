@@ -29,6 +29,7 @@ mod model;
 mod points;
 mod profile;
 mod read;
+mod reference;
 mod resolve;
 mod schema;
 mod set;

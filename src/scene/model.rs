@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::error::{Place, SceneError, Sources};
+use crate::solid::Shape;
 
 /// An enum whose variants have names in scene files.
 macro_rules! named {
@@ -147,6 +148,8 @@ pub struct SceneModel {
     pub profiles: Vec<(String, ProfileModel)>,
     /// Solids, at least one, in the order in which they combine.
     pub solids: Vec<SolidModel>,
+    /// The closed form that the scene is compared with.
+    pub reference: Option<ReferenceModel>,
     /// The texts all places refer to.
     pub sources: Sources,
 }
@@ -360,6 +363,20 @@ pub enum SolidKind {
         /// The axis.
         axis: AxisModel,
     },
+}
+
+/// A closed form to compare with: `[reference]`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct ReferenceModel {
+    /// The shape.
+    pub shape: Shape,
+    /// Its axis; cylinder and cone rise from its origin, the others are centred there.
+    pub axis: AxisModel,
+    /// Steps that place it, first to last.
+    pub steps: Vec<PlaceStep>,
+    /// The table.
+    pub place: Place,
 }
 
 /// An axis of revolution.

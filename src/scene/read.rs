@@ -14,6 +14,7 @@ use super::model::{
 };
 use super::points::PointFiles;
 use super::profile::profile;
+use super::reference::reference;
 use super::solid::solids;
 use super::value::{Kind, Value};
 
@@ -76,6 +77,7 @@ pub(super) fn scene(
     let solids = fields.need("solid", "at least one [[solid]]", |value| {
         solids(value, &profiles, sources)
     })?;
+    let reference = fields.read("reference", reference)?;
     Ok(SceneModel {
         name,
         units,
@@ -84,6 +86,7 @@ pub(super) fn scene(
         materials,
         profiles,
         solids,
+        reference,
         sources: Sources::default(),
     })
 }

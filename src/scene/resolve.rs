@@ -8,8 +8,9 @@ use serde_json::{Map, Value, json};
 
 use super::model::{
     AxisModel, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PlaceStep, PointModel,
-    ProfileModel, SceneModel, SolidKind, SolidModel,
+    ProfileModel, ReferenceModel, SceneModel, SolidKind, SolidModel,
 };
+use crate::solid::Shape;
 
 impl SceneModel {
     /// The scene in full: a valid scene in its JSON form.
@@ -36,6 +37,10 @@ impl SceneModel {
             (
                 "solid",
                 self.solids.iter().map(|model| self.solid(model)).collect(),
+            ),
+            (
+                "reference",
+                self.reference.as_ref().map_or(Value::Null, reference),
             ),
         ])
     }
@@ -196,6 +201,37 @@ fn curve(model: &CurveModel) -> Value {
             ("degree", json!(degree)),
         ]),
     }
+}
+
+fn reference(model: &ReferenceModel) -> Value {
+    let mut keys = match model.shape {
+        Shape::Torus { major, minor } => {
+            vec![
+                ("kind", json!("torus")),
+                ("major", json!(major)),
+                ("minor", json!(minor)),
+            ]
+        }
+        Shape::Cylinder { radius, height } => vec![
+            ("kind", json!("cylinder")),
+            ("radius", json!(radius)),
+            ("height", json!(height)),
+        ],
+        Shape::Cone {
+            radius1,
+            radius2,
+            height,
+        } => vec![
+            ("kind", json!("cone")),
+            ("radius1", json!(radius1)),
+            ("radius2", json!(radius2)),
+            ("height", json!(height)),
+        ],
+        Shape::Sphere { radius } => vec![("kind", json!("sphere")), ("radius", json!(radius))],
+    };
+    keys.push(("axis", axis(&model.axis)));
+    keys.push(("place", model.steps.iter().map(step).collect()));
+    sorted(keys.into_iter().map(|(key, value)| (key.to_owned(), value)))
 }
 
 fn axis(model: &AxisModel) -> Value {

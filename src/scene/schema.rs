@@ -61,6 +61,7 @@ pub fn json_schema() -> Value {
                     json!({ "$ref": "#/$defs/solid" }),
                 ),
             ),
+            ("reference", reference()),
         ],
     );
     root["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
@@ -463,7 +464,30 @@ fn curve_kinds() -> Value {
     ])
 }
 
-fn solid() -> Value {
+fn axis() -> Value {
+    object(
+        "The axis of revolution.",
+        &[],
+        [
+            (
+                "origin",
+                with_default(vector("A point of the axis, height 0."), json!([0, 0, 0])),
+            ),
+            (
+                "direction",
+                with_default(vector("Direction, not zero."), json!([0, 0, 1])),
+            ),
+            (
+                "x",
+                vector(
+                    "Zero-angle direction, not parallel to the axis; by default +x, or +y where the axis is near x.",
+                ),
+            ),
+        ],
+    )
+}
+
+fn place() -> Value {
     let step = |key: &str, value: Value| object("One step.", &[key], [(key, value)]);
     let rotate = object(
         "Turn about an axis through the origin.",
@@ -476,6 +500,57 @@ fn solid() -> Value {
             ),
         ],
     );
+    with_default(
+        array(
+            "Steps that place the solid, first to last.",
+            0,
+            choice(
+                "One step.",
+                json!([
+                    step("scale", length("Scale about the origin.")),
+                    step("rotate", rotate),
+                    step("translate", vector("Move by this vector.")),
+                ]),
+            ),
+        ),
+        json!([]),
+    )
+}
+
+fn reference() -> Value {
+    let one = |(kind, keys): &(&str, &[&str])| {
+        let property = |key: &str| match key {
+            "kind" => json!({ "const": kind, "description": "Kind of shape." }),
+            "axis" => axis(),
+            "place" => place(),
+            "radius1" | "radius2" => json!({
+                "description": "Radius at the bottom, and at the top; one may be 0.",
+                "type": "number",
+                "minimum": 0,
+                "maximum": MAX_MAGNITUDE,
+            }),
+            _ => length("A length."),
+        };
+        let properties: Map<String, Value> = keys
+            .iter()
+            .map(|&key| (key.to_owned(), property(key)))
+            .collect();
+        let sizes = keys.iter().filter(|k| !matches!(**k, "axis" | "place"));
+        json!({
+            "description": "A closed form; cylinder and cone rise from the origin of the axis, the others are centred there.",
+            "type": "object",
+            "properties": properties,
+            "required": sizes.collect::<Vec<_>>(),
+            "additionalProperties": false,
+        })
+    };
+    choice(
+        "The closed form that the scene is compared with.",
+        super::keys::REFERENCES.iter().map(one).collect(),
+    )
+}
+
+fn solid() -> Value {
     object(
         "A solid: a profile turned about an axis.",
         &["kind", "profile"],
@@ -506,50 +581,8 @@ fn solid() -> Value {
                 "start",
                 with_default(number("Degrees where the turn starts."), json!(0)),
             ),
-            (
-                "axis",
-                object(
-                    "The axis of revolution.",
-                    &[],
-                    [
-                        (
-                            "origin",
-                            with_default(
-                                vector("A point of the axis, height 0."),
-                                json!([0, 0, 0]),
-                            ),
-                        ),
-                        (
-                            "direction",
-                            with_default(vector("Direction, not zero."), json!([0, 0, 1])),
-                        ),
-                        (
-                            "x",
-                            vector(
-                                "Zero-angle direction, not parallel to the axis; by default +x, or +y where the axis is near x.",
-                            ),
-                        ),
-                    ],
-                ),
-            ),
-            (
-                "place",
-                with_default(
-                    array(
-                        "Steps that place the solid, first to last.",
-                        0,
-                        choice(
-                            "One step.",
-                            json!([
-                                step("scale", length("Scale about the origin.")),
-                                step("rotate", rotate),
-                                step("translate", vector("Move by this vector.")),
-                            ]),
-                        ),
-                    ),
-                    json!([]),
-                ),
-            ),
+            ("axis", axis()),
+            ("place", place()),
             (
                 "operation",
                 with_default(
@@ -613,6 +646,14 @@ mod tests {
             json!(keys::SOLIDS[0].0)
         );
         check(solid, keys::SOLIDS[0].1);
+        let references = schema["properties"]["reference"]["oneOf"]
+            .as_array()
+            .expect("kinds");
+        assert_eq!(references.len(), keys::REFERENCES.len());
+        for (reference, (kind, keys)) in references.iter().zip(keys::REFERENCES) {
+            assert_eq!(reference["properties"]["kind"]["const"], json!(kind));
+            check(reference, keys);
+        }
         check(&solid["properties"]["axis"], keys::AXIS);
         let steps = solid["properties"]["place"]["items"]["oneOf"]
             .as_array()

@@ -138,7 +138,7 @@ fn solid(
     })
 }
 
-fn axis(value: &Value) -> Result<AxisModel, Fault> {
+pub(super) fn axis(value: &Value) -> Result<AxisModel, Fault> {
     let fields = Fields::new(value, keys::AXIS, "a table: an axis")?;
     let origin = fields.read("origin", vector)?.unwrap_or([0.0; 3]);
     let along = fields
@@ -163,7 +163,7 @@ fn axis(value: &Value) -> Result<AxisModel, Fault> {
     })
 }
 
-fn step(value: &Value) -> Result<PlaceStep, Fault> {
+pub(super) fn step(value: &Value) -> Result<PlaceStep, Fault> {
     let wanted = "a step: a table of one of scale, rotate, translate";
     let fields = Fields::new(value, keys::STEP, wanted)?;
     let scale = fields.read("scale", |value| {

@@ -4,6 +4,7 @@
 //! turn the nearest boundary point lies in that half-plane, so membership and distance are those
 //! of the region. A partial turn adds two flat caps.
 
+mod analytic;
 mod assembly;
 mod body;
 mod bounds;
@@ -20,6 +21,7 @@ mod terms;
 mod turn;
 mod turned;
 
+pub use analytic::{Analytic, Shape};
 pub use assembly::Assembly;
 pub use body::Body;
 pub use measure::{MeasureErrors, Measures, Moments};

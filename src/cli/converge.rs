@@ -1,0 +1,171 @@
+//! `voxlathe converge`: errors over several resolutions.
+
+use super::arguments::{Common, Converge};
+use super::failure::Failure;
+use super::interrupt;
+use super::output::Console;
+use crate::converge::{Plan, Row, Study, study};
+use crate::io::{IoError, write_file_atomically};
+use crate::scene::Scene;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+const TABLE: &str = "converge.csv";
+
+pub(super) fn run(
+    arguments: &Converge,
+    common: &Common,
+    console: &Console,
+) -> Result<ExitCode, Failure> {
+    if let Some(directory) = &arguments.output {
+        check_free(directory, arguments.force)?;
+    }
+    let scene = Scene::load_with(&arguments.scene, &common.set)?;
+    for warning in scene.warnings() {
+        console.warn(warning);
+    }
+    let plan = Plan {
+        resolutions: arguments.resolutions.clone(),
+        offsets: arguments.offsets,
+    };
+    let bar = console.bar(plan.resolutions.len() as u64, "resolutions");
+    let found = study(&scene, &plan, &interrupt::check, &mut |_| bar.inc(1))?;
+    bar.finish_and_clear();
+    let mut files = Vec::new();
+    if let Some(directory) = &arguments.output {
+        let path = directory.join(TABLE);
+        std::fs::create_dir_all(directory).map_err(|source| IoError::Write {
+            path: directory.clone(),
+            source,
+        })?;
+        write_file_atomically(&path, |file| file.write_all(csv(&found).as_bytes()))?;
+        files.push(path);
+    }
+    let document = json!({
+        "scene": scene.name(),
+        "units": scene.model().units.name(),
+        "reference": scene.model().resolve().get("reference"),
+        "volume": found.volume,
+        "offsets": plan.offsets,
+        "rows": found.rows.iter().map(entry).collect::<Vec<_>>(),
+        "orders": orders(&found),
+        "files": files,
+        "warnings": scene.warnings(),
+    });
+    console.result(&document, &table(&found, scene.model().units.name()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A directory that holds something is kept as it is unless the user says otherwise.
+fn check_free(directory: &Path, force: bool) -> Result<(), Failure> {
+    let mut held = match std::fs::read_dir(directory) {
+        Ok(held) => held,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(e) => {
+            let shown = directory.display();
+            return Err(Failure::usage(format!("cannot write into {shown}: {e}")));
+        }
+    };
+    if held.next().is_some() && !force {
+        let shown = directory.display();
+        return Err(Failure::usage(format!(
+            "{shown} is not empty; choose another directory, or add --force to replace {TABLE} in it"
+        )));
+    }
+    Ok(())
+}
+
+fn entry(row: &Row) -> Value {
+    json!({
+        "resolution": row.resolution,
+        "spacing": row.spacing,
+        "volume_occupancy_error": row.volume_occupancy_error,
+        "volume_occupancy_mean_error": row.volume_occupancy_mean_error,
+        "volume_fraction_error": row.volume_fraction_error,
+        "volume_fraction_bound": row.volume_fraction_bound,
+        "sdf_max_error": row.sdf_max_error,
+        "sdf_mean_error": row.sdf_mean_error,
+    })
+}
+
+fn orders(study: &Study) -> Value {
+    json!({
+        "volume_occupancy_error": study.orders.volume_occupancy_error,
+        "volume_fraction_error": study.orders.volume_fraction_error,
+        "sdf_max_error": study.orders.sdf_max_error,
+        "sdf_mean_error": study.orders.sdf_mean_error,
+    })
+}
+
+/// A column: its name, and its value in a row.
+type Column = (&'static str, fn(&Row) -> f64);
+
+const COLUMNS: [Column; 7] = [
+    ("spacing", |r| r.spacing),
+    ("volume_occupancy_error", |r| r.volume_occupancy_error),
+    ("volume_occupancy_mean_error", |r| {
+        r.volume_occupancy_mean_error
+    }),
+    ("volume_fraction_error", |r| r.volume_fraction_error),
+    ("volume_fraction_bound", |r| r.volume_fraction_bound),
+    ("sdf_max_error", |r| r.sdf_max_error),
+    ("sdf_mean_error", |r| r.sdf_mean_error),
+];
+
+fn csv(study: &Study) -> String {
+    let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).collect();
+    let mut text = format!("resolution,{}\n", names.join(","));
+    for row in &study.rows {
+        // Writing to a string does not fail.
+        let _ = write!(text, "{}", row.resolution);
+        for (_, value) in COLUMNS {
+            let _ = write!(text, ",{:e}", value(row));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn table(study: &Study, units: &str) -> String {
+    let mut text = format!(
+        "volume {} {units}^3; errors of volumes relative, of distances in {units}\n\n",
+        study.volume
+    );
+    let head = [
+        "resolution",
+        "spacing",
+        "occupancy",
+        "mean",
+        "fraction",
+        "bound",
+        "sdf max",
+        "sdf mean",
+    ];
+    let line = |cells: &[String]| {
+        let cells: Vec<String> = cells.iter().map(|c| format!("{c:>10}")).collect();
+        cells.join("  ") + "\n"
+    };
+    text += &line(&head.map(str::to_owned));
+    for row in &study.rows {
+        let values = COLUMNS.map(|(_, value)| format!("{:.3e}", value(row)));
+        let mut cells = vec![row.resolution.to_string()];
+        cells.extend(values);
+        text += &line(&cells);
+    }
+    let order = |o: Option<f64>| o.map_or_else(|| "-".to_owned(), |o| format!("{o:.2}"));
+    let o = &study.orders;
+    let blank = String::new;
+    text += &line(&[
+        "order".to_owned(),
+        blank(),
+        blank(),
+        order(o.volume_occupancy_error),
+        order(o.volume_fraction_error),
+        blank(),
+        order(o.sdf_max_error),
+        order(o.sdf_mean_error),
+    ]);
+    text
+}
