@@ -76,6 +76,8 @@ pub(super) enum Command {
     Query(Query),
     /// Exact volume, area, centroid, inertia tensor and bounds
     Measure(Measure),
+    /// Write the tessellated boundary: .stl, .obj or .ply
+    Mesh(Mesh),
     /// Show what a finished stack holds, and verify its digests
     Info(Info),
     /// Write a manual page, shell completions or the schema of scene files to standard output
@@ -182,6 +184,29 @@ pub(super) struct Measure {
     /// The scene: TOML, JSON by its ending, or - for TOML on standard input
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The mesh is closed, oriented outward and nowhere further from the true surface than the chord error, nor that from
+the mesh. Solids that share axis and turn become one mesh; --parts writes each solid's own to FILE's stem, -, the
+solid's name and the extension. STL has single precision; OBJ and PLY keep all digits.
+
+Example: voxlathe mesh scenes/goblet.toml -o goblet.ply --chord-error 0.05")]
+pub(super) struct Mesh {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// File to write, .stl, .obj or .ply
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Largest distance between mesh and true surface, in scene units; a tenth of the smallest grid
+    /// spacing without it
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    pub(super) chord_error: Option<f64>,
+    /// Write each solid's own mesh
+    #[arg(long)]
+    pub(super) parts: bool,
 }
 
 #[derive(Debug, Args)]
