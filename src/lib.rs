@@ -13,6 +13,7 @@
 //! Scene text becomes solids, solids meet a grid layer by layer, layers become files.
 //!
 //! ```text
+//!                          ┌─────> mesh ─────┐
 //!   scene ──> region ──> solid ──> sample ──> io          cli drives them all
 //!               │          │         │
 //!             nurbs        │        grid
@@ -25,10 +26,12 @@
 //!   certified closest points, the boundary of the filled region, its moments as line integrals.
 //! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, area, centroid and inertia,
 //!   row spans, volume fractions of voxels.
+//! * [`mesh`]: the boundary of a body as triangles with a proven chord error; crossings of rays, winding numbers
+//!   and nearest points of triangles, for checks.
 //! * [`grid`]: where the voxels are; it knows no geometry.
 //! * [`sample`]: layers of occupancy, fraction, distance and material.
 //! * [`converge`]: how the samples approach the solid as voxels become smaller.
-//! * [`io`]: the EXR stack with its manifest, tables of points; it knows no geometry.
+//! * [`io`]: the EXR stack with its manifest, tables of points, files of triangles; it knows no geometry.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
 //!
 //! # What is exact, and how
@@ -47,6 +50,7 @@ pub mod error;
 pub mod grid;
 pub mod io;
 pub mod math;
+pub mod mesh;
 pub mod nurbs;
 pub mod region;
 pub mod sample;

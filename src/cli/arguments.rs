@@ -78,6 +78,8 @@ pub(super) enum Command {
     Measure(Measure),
     /// Errors of volumes and distances over several resolutions, with fitted orders
     Converge(Converge),
+    /// Write the tessellated boundary: .stl, .obj or .ply
+    Mesh(Mesh),
     /// Show what a finished stack holds, and verify its digests
     Info(Info),
     /// Write a manual page, shell completions or the schema of scene files to standard output
@@ -219,6 +221,29 @@ pub(super) struct Converge {
 
 /// Largest resolution of `converge`: its layers are held whole.
 const MOST_CONVERGED: i64 = 4096;
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The mesh is closed, oriented outward and nowhere further from the true surface than the chord error, nor that from
+the mesh. Solids that share axis and turn become one mesh; --parts writes each solid's own to FILE's stem, -, the
+solid's name and the extension. STL has single precision; OBJ and PLY keep all digits.
+
+Example: voxlathe mesh scenes/goblet.toml -o goblet.ply --chord-error 0.05")]
+pub(super) struct Mesh {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// File to write, .stl, .obj or .ply
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Largest distance between mesh and true surface, in scene units; a tenth of the smallest grid
+    /// spacing without it
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    pub(super) chord_error: Option<f64>,
+    /// Write each solid's own mesh
+    #[arg(long)]
+    pub(super) parts: bool,
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = "Exit code 1 when a file is missing or its digest differs.")]

@@ -9,6 +9,7 @@ mod generate;
 mod info;
 mod interrupt;
 mod measure;
+mod mesh;
 mod output;
 mod query;
 mod voxelize;
@@ -61,6 +62,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Query(a) => query::run(a, common, console),
         Command::Measure(a) => measure::run(a, common, console),
         Command::Converge(a) => converge::run(a, common, console),
+        Command::Mesh(a) => mesh::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }

@@ -126,6 +126,20 @@ pub enum IoError {
         /// What was found and what was wanted.
         reason: String,
     },
+    /// A mesh format is unknown.
+    #[error("{}: cannot tell the format from the name; it must end in .stl, .obj or .ply", path.display())]
+    MeshFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A coordinate is beyond the numbers of the file's format.
+    #[error("{}: a coordinate is {found:e}, beyond the single precision of .stl; write .ply or .obj, or choose other units", path.display())]
+    MeshRange {
+        /// The file.
+        path: PathBuf,
+        /// The size of the coordinate.
+        found: f64,
+    },
     /// A point or table format is unknown.
     #[error("{}: cannot tell the format from the name; it must end in .csv or .npy", path.display())]
     TableFormat {

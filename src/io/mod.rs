@@ -1,4 +1,4 @@
-//! Files: the EXR stack with its manifest, and the points of a query.
+//! Files: the EXR stack with its manifest, the points of a query, and meshes.
 //!
 //! ```text
 //!   layers ──> exr (bytes of one slice) ──> directory (staged, synced)
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`stack`] is the whole path in one type, [`verify`] the way back, [`points`] the tables that
-//! `query` reads and writes. Nothing here knows geometry or scenes, only grids and bytes.
+//! `query` reads and writes, [`mesh`] the files of triangles. Nothing here knows geometry or scenes, only grids and bytes.
 //!
 //! Equal input gives equal bytes: no times, no random names, no map order reaches a file. A file
 //! appears under its final name only when it is whole and synced.
@@ -17,6 +17,7 @@ pub mod directory;
 mod error;
 pub mod exr;
 pub mod manifest;
+pub mod mesh;
 pub mod points;
 pub mod stack;
 pub mod verify;
@@ -24,6 +25,7 @@ pub mod verify;
 pub use directory::{StackDirectory, available_bytes, write_file_atomically};
 pub use error::{IoError, IoErrorKind};
 pub use manifest::Manifest;
+pub use mesh::write_mesh;
 pub use points::{read_points, write_columns};
 pub use stack::{StackWriter, write_stack};
 pub use verify::{StackReport, verify_stack};

@@ -139,7 +139,7 @@ impl Body {
     }
 
     /// The pieces around the turned region, in its unit.
-    pub(super) fn boundary(&self) -> &[BoundaryPiece] {
+    pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
         &self.boundary
     }
 

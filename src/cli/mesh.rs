@@ -1,0 +1,150 @@
+//! `voxlathe mesh`: the tessellated boundary.
+
+use super::arguments::{Common, Mesh as Arguments};
+use super::failure::Failure;
+use super::interrupt;
+use super::output::{Console, NOTHING_LEFT};
+use crate::io::mesh::{check_mesh_name, write_mesh};
+use crate::mesh::{Mesh, tessellate};
+use crate::scene::Scene;
+use crate::solid::Body;
+use rayon::prelude::*;
+use serde_json::json;
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// The default chord error as a share of the smallest grid spacing.
+const DEFAULT_SHARE: f64 = 0.1;
+
+/// A mesh to make and the file for it.
+struct Job<'a> {
+    solid: &'a str,
+    body: &'a Body,
+    file: PathBuf,
+}
+
+pub(super) fn run(
+    arguments: &Arguments,
+    common: &Common,
+    console: &Console,
+) -> Result<ExitCode, Failure> {
+    check_mesh_name(&arguments.output)?;
+    let scene = Scene::load_with(&arguments.scene, &common.set)?;
+    for warning in scene.warnings() {
+        console.warn(warning);
+    }
+    let chord_error = match arguments.chord_error {
+        Some(given) => given,
+        None => DEFAULT_SHARE * scene.grid()?.spacing().min_element(),
+    };
+    let jobs = jobs(&scene, arguments)?;
+    let made = jobs
+        .par_iter()
+        .map(|job| {
+            interrupt::check()?;
+            tessellate(job.body, chord_error)
+                .map_err(|e| Failure::usage(format!("solid {:?}: {e}", job.solid)))
+        })
+        .collect::<Result<Vec<Mesh>, Failure>>()?;
+    let units = scene.model().units.name();
+    let note = format!("voxlathe {}, lengths in {units}", env!("CARGO_PKG_VERSION"));
+    let mut files = Vec::new();
+    let mut text = String::new();
+    for (job, mesh) in jobs.iter().zip(&made) {
+        interrupt::check()?;
+        write_mesh(&job.file, mesh.vertices(), mesh.triangles(), &note)?;
+        let volume = mesh.volume();
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            text,
+            "{}: {} triangles, {} vertices, within {:.3e} {units}, volume {volume} {units}^3",
+            job.file.display(),
+            mesh.triangles().len(),
+            mesh.vertices().len(),
+            mesh.chord_error(),
+        );
+        files.push(json!({
+            "file": job.file,
+            "solid": job.solid,
+            "triangles": mesh.triangles().len(),
+            "vertices": mesh.vertices().len(),
+            "chord_error": mesh.chord_error(),
+            "volume": volume,
+        }));
+    }
+    let document = json!({
+        "scene": scene.name(),
+        "units": units,
+        "files": files,
+        "warnings": scene.warnings(),
+    });
+    console.result(&document, &text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What is to be meshed: each solid's own body, or the one body that the scene is.
+fn jobs<'a>(scene: &'a Scene, arguments: &Arguments) -> Result<Vec<Job<'a>>, Failure> {
+    let assembly = scene.assembly();
+    let parts = assembly.parts();
+    if arguments.parts {
+        let mut taken: HashMap<PathBuf, &str> = HashMap::new();
+        return parts
+            .iter()
+            .map(|part| {
+                let file = part_file(&arguments.output, part.name());
+                if let Some(other) = taken.insert(file.clone(), part.name()) {
+                    return Err(Failure::usage(format!(
+                        "--parts: solids {other:?} and {:?} would both be {}; rename one",
+                        part.name(),
+                        file.display()
+                    )));
+                }
+                Ok(Job {
+                    solid: part.name(),
+                    body: part.body(),
+                    file,
+                })
+            })
+            .collect();
+    }
+    if assembly.is_empty() {
+        return Err(Failure::usage(NOTHING_LEFT));
+    }
+    let Some(body) = assembly.single() else {
+        return Err(Failure::usage(format!(
+            "the scene's {} solids do not share axis and turn, and only solids that do become one mesh; give --parts to write a mesh of each",
+            parts.len()
+        )));
+    };
+    let solid = match parts {
+        [only] => only.name(),
+        _ => scene.name(),
+    };
+    Ok(vec![Job {
+        solid,
+        body,
+        file: arguments.output.clone(),
+    }])
+}
+
+/// The file of one solid: the stem, `-`, the solid's name and the extension.
+fn part_file(path: &Path, name: &str) -> PathBuf {
+    // A name is any text; a part of a path is not.
+    let fit = |c: char| {
+        if c.is_control() || "/\\:".contains(c) {
+            '_'
+        } else {
+            c
+        }
+    };
+    let mut file = path.file_stem().unwrap_or_default().to_os_string();
+    file.push("-");
+    file.push(name.chars().map(fit).collect::<String>());
+    if let Some(extension) = path.extension() {
+        file.push(".");
+        file.push(extension);
+    }
+    path.with_file_name(file)
+}
