@@ -30,6 +30,7 @@
 //!   and nearest points of triangles, for checks.
 //! * [`grid`]: where the voxels are; it knows no geometry.
 //! * [`sample`]: layers of occupancy, fraction, distance and material.
+//! * [`validate`]: the exact answers held against the triangles, the field against what a distance is.
 //! * [`converge`]: how the samples approach the solid as voxels become smaller.
 //! * [`io`]: the EXR stack with its manifest, tables of points, files of triangles; it knows no geometry.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
@@ -56,6 +57,7 @@ pub mod region;
 pub mod sample;
 pub mod scene;
 pub mod solid;
+pub mod validate;
 
 pub use error::Error;
 pub use scene::Scene;

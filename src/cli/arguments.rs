@@ -76,6 +76,8 @@ pub(super) enum Command {
     Query(Query),
     /// Exact volume, area, centroid, inertia tensor and bounds
     Measure(Measure),
+    /// Compare inside tests and distances with the tessellated boundary
+    Validate(Validate),
     /// Errors of volumes and distances over several resolutions, with fitted orders
     Converge(Converge),
     /// Write the tessellated boundary: .stl, .obj or .ply
@@ -99,24 +101,8 @@ pub(super) struct Voxelize {
     /// Directory to write
     #[arg(long, short, value_name = "DIR")]
     pub(super) output: PathBuf,
-    /// Voxels along the longest side, or along each side as NX,NY,NZ
-    #[arg(
-        long,
-        value_name = "N",
-        value_delimiter = ',',
-        num_args = 1,
-        conflicts_with = "spacing"
-    )]
-    pub(super) resolution: Vec<u32>,
-    /// Size of a voxel in scene units, or DX,DY,DZ
-    #[arg(
-        long,
-        value_name = "D",
-        value_delimiter = ',',
-        num_args = 1,
-        allow_negative_numbers = true
-    )]
-    pub(super) spacing: Vec<f64>,
+    #[command(flatten)]
+    pub(super) step: Step,
     /// What to sample: occupancy, fraction, sdf, material
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(super) channels: Vec<String>,
@@ -138,6 +124,29 @@ pub(super) struct Voxelize {
     /// Say what would be written, and write nothing
     #[arg(long)]
     pub(super) dry_run: bool,
+}
+
+/// Flags in place of the scene's resolution, spacing, origin and dims; its bounds stay.
+#[derive(Debug, Args)]
+pub(super) struct Step {
+    /// Voxels along the longest side, or along each side as NX,NY,NZ
+    #[arg(
+        long,
+        value_name = "N",
+        value_delimiter = ',',
+        num_args = 1,
+        conflicts_with = "spacing"
+    )]
+    pub(super) resolution: Vec<u32>,
+    /// Size of a voxel in scene units, or DX,DY,DZ
+    #[arg(
+        long,
+        value_name = "D",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_negative_numbers = true
+    )]
+    pub(super) spacing: Vec<f64>,
 }
 
 #[derive(Debug, Args)]
@@ -186,6 +195,33 @@ pub(super) struct Measure {
     /// The scene: TOML, JSON by its ending, or - for TOML on standard input
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Every voxel centre is asked of the exact path, of a ray's crossings with the triangles and of their winding number.
+Where they differ, the exact surface must lie within the triangles' chord error; then the distance is checked: finite,
+of the right sign, no steeper than 1, of slope 1 away from the medial axis, zero where the triangles are.
+
+Exit code 1 when a difference is not explained or a check fails.
+
+Example: voxlathe validate scenes/goblet.toml --resolution 64 -o goblet.html")]
+pub(super) struct Validate {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    #[command(flatten)]
+    pub(super) step: Step,
+    /// Look at this many random points of the grid's box instead of every voxel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(super) samples: Option<u64>,
+    /// Largest distance between triangles and true surface, in scene units; a tenth of the smallest
+    /// grid spacing without it
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    pub(super) chord_error: Option<f64>,
+    /// Page to write the report to, .html
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The default chord error as a share of the smallest grid spacing.
-const DEFAULT_SHARE: f64 = 0.1;
+pub(super) const DEFAULT_SHARE: f64 = 0.1;
 
 /// A mesh to make and the file for it.
 struct Job<'a> {

@@ -12,6 +12,8 @@ mod measure;
 mod mesh;
 mod output;
 mod query;
+mod step;
+mod validate;
 mod voxelize;
 
 use arguments::{Arguments, Command};
@@ -61,6 +63,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Voxelize(a) => voxelize::run(a, common, console),
         Command::Query(a) => query::run(a, common, console),
         Command::Measure(a) => measure::run(a, common, console),
+        Command::Validate(a) => validate::run(a, common, console),
         Command::Converge(a) => converge::run(a, common, console),
         Command::Mesh(a) => mesh::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),

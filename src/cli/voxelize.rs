@@ -13,7 +13,7 @@ use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
 };
 use crate::sample::{Certainty, Channel, LayerBuffers, LayerSampler, Selection, Tally};
-use crate::scene::{ChannelName, CompressionName, FormatName, GridStep, Scene, nearest};
+use crate::scene::{ChannelName, CompressionName, FormatName, Scene, nearest};
 use crate::solid::{Operation, Part};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -121,27 +121,7 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         Ok(chosen)
     }
     let (grid, output) = scene.model_mut();
-    match *arguments.resolution.as_slice() {
-        [] => {}
-        [n] if n > 0 => grid.step = GridStep::Resolution(n),
-        [x, y, z] if x > 0 && y > 0 && z > 0 => grid.step = GridStep::Resolutions([x, y, z]),
-        ref other => {
-            return Err(Failure::usage(format!(
-                "--resolution: {other:?} is not one number or three, each at least 1"
-            )));
-        }
-    }
-    let size = |v: f64| v.is_finite() && v > 0.0;
-    match *arguments.spacing.as_slice() {
-        [] => {}
-        [d] if size(d) => grid.step = GridStep::Spacing([d; 3]),
-        [x, y, z] if size(x) && size(y) && size(z) => grid.step = GridStep::Spacing([x, y, z]),
-        ref other => {
-            return Err(Failure::usage(format!(
-                "--spacing: {other:?} is not one number or three, each finite and greater than 0"
-            )));
-        }
-    }
+    arguments.step.apply(grid)?;
     let channels = names(
         &arguments.channels,
         "--channels",
@@ -174,7 +154,7 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         output.compression = kind;
     }
     if let Some(band) = arguments.band {
-        if !size(band) {
+        if !(band.is_finite() && band > 0.0) {
             return Err(Failure::usage(format!(
                 "--band: {band} is not a finite number greater than 0"
             )));

@@ -293,7 +293,7 @@ impl<'a> LayerSampler<'a> {
             let point = self.grid.centre(i, j, k);
             let (side, inside) = (|b: usize| sides[b][i], occupancy[i] != 0);
             let measured = self.assembly.measure_distance(point, side, inside, reaches);
-            *value = to_f32(signed(measured.distance, inside).clamp(-band, band));
+            *value = stored(signed(measured.distance, inside).clamp(-band, band));
             reaches.moved(spacing.x);
             // A clamped value says only how far the surface is at least.
             if measured.distance < band {
@@ -305,7 +305,7 @@ impl<'a> LayerSampler<'a> {
 }
 
 /// The stored form of a signed distance: nearest f32, but never across zero.
-fn to_f32(distance: f64) -> f32 {
+pub(crate) fn stored(distance: f64) -> f32 {
     #[allow(
         clippy::cast_possible_truncation,
         reason = "the one place where distances become f32"

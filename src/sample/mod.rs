@@ -10,6 +10,7 @@ mod layer;
 mod tally;
 mod volume;
 
+pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
 pub use tally::{Certainty, Tally};
 pub use volume::{fraction, material, occupancy, signed_distance};

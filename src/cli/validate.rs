@@ -1,0 +1,217 @@
+//! `voxlathe validate`: the exact answers held against the tessellated boundary.
+
+use super::arguments::{Common, Validate};
+use super::failure::Failure;
+use super::interrupt;
+use super::mesh::DEFAULT_SHARE;
+use super::output::Console;
+use crate::grid::GridSpec;
+use crate::io::write_file_atomically;
+use crate::scene::Scene;
+use crate::validate::{Heading, Points, Report, meshes, page, validate};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::process::ExitCode;
+
+pub(super) fn run(
+    arguments: &Validate,
+    common: &Common,
+    console: &Console,
+) -> Result<ExitCode, Failure> {
+    if let Some(path) = &arguments.output {
+        let known = path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("html"));
+        if !known {
+            return Err(Failure::usage(format!(
+                "-o: {} does not end in .html, the one format of a report",
+                path.display()
+            )));
+        }
+    }
+    let mut scene = Scene::load_with(&arguments.scene, &common.set)?;
+    arguments.step.apply(scene.model_mut().0)?;
+    for warning in scene.warnings() {
+        console.warn(warning);
+    }
+    let grid = scene.grid()?;
+    let chord_error = arguments
+        .chord_error
+        .unwrap_or(DEFAULT_SHARE * grid.spacing().min_element());
+    let meshes = meshes(&scene, chord_error)
+        .map_err(|(name, e)| Failure::usage(format!("--chord-error: solid {name:?}: {e}")))?;
+    let (points, count) = match arguments.samples {
+        Some(n) => (Points::Random(n), n),
+        None => (Points::Grid, grid.voxel_count()),
+    };
+    let bar = console.bar(count, "points");
+    let report = validate(&scene, &grid, &meshes, points, &interrupt::check, &|n| {
+        bar.inc(n)
+    })?;
+    bar.finish_and_clear();
+    if let Some(path) = &arguments.output {
+        let hash = scene.hash();
+        let heading = Heading {
+            scene: scene.name(),
+            hash: &hash,
+            units: scene.model().units.name(),
+            dims: grid.dims(),
+            spacing: grid.spacing().to_array(),
+        };
+        write_file_atomically(path, |file| {
+            file.write_all(page(&report, &heading).as_bytes())
+        })?;
+    }
+    let document = document(&report, &scene, &grid);
+    console.result(&document, &text(&report, scene.model().units.name()))?;
+    if report.is_ok() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    console.say("error: there are differences that nothing explains; see the report");
+    Ok(ExitCode::from(1))
+}
+
+fn document(report: &Report, scene: &Scene, grid: &GridSpec) -> Value {
+    let f = &report.field;
+    let counts = |[looked, failed]: [u64; 2]| json!({ "checked": looked, "failed": failed });
+    json!({
+        "scene": scene.name(),
+        "units": scene.model().units.name(),
+        "dims": grid.dims(),
+        "origin": grid.origin().to_array(),
+        "spacing": grid.spacing().to_array(),
+        "samples": report.samples,
+        "agree": report.agree,
+        "within_chord_error": report.within_chord_error,
+        "disagree": report.disagree,
+        "chord_error": report.chord_error(),
+        "triangles": report.triangles(),
+        "gradient_max_error": f.gradient_max_error,
+        "ok": report.is_ok(),
+        "meshes": report.meshes.iter().map(|m| json!({
+            "name": m.name,
+            "triangles": m.triangles,
+            "chord_error": m.chord_error,
+            "closed": m.closed,
+            "euler_characteristic": m.euler_characteristic,
+            "volume": m.volume,
+        })).collect::<Vec<_>>(),
+        "field": {
+            "not_finite": f.not_finite,
+            "wrong_sign": f.wrong_sign,
+            "steepness": counts(f.steepness),
+            "slope": counts(f.slope),
+            "zero": counts(f.zero),
+            "distance": counts(f.distance),
+            "distance_max_error": f.distance_max_error,
+            "violations": f.violations.iter().map(|v| json!({
+                "check": v.check,
+                "voxel": v.voxel,
+                "point": v.point.to_array(),
+                "off": v.off[0],
+                "allowed": v.off[1],
+            })).collect::<Vec<_>>(),
+        },
+        "disagreements": report.disagreements.iter().map(|d| json!({
+            "voxel": d.voxel,
+            "point": d.point.to_array(),
+            "inside": d.inside,
+            "parity": d.parity,
+            "winding": d.winding,
+            "solids": d.parts.iter().map(|p| json!({
+                "name": p.name,
+                "inside": p.inside,
+                "parity": p.parity,
+                "winding": p.winding,
+                "distance": p.distance,
+                "chord_error": p.chord_error,
+            })).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
+        "warnings": scene.warnings(),
+    })
+}
+
+/// The report for people.
+fn text(report: &Report, units: &str) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{name:<12} {value}");
+    };
+    for m in &report.meshes {
+        let closed = if m.closed { "closed" } else { "NOT CLOSED" };
+        line(
+            "triangles",
+            format!(
+                "{} of {:?}, {closed}, within {:.3e} {units}",
+                m.triangles, m.name, m.chord_error
+            ),
+        );
+    }
+    line("points", report.samples.to_string());
+    line("agree", report.agree.to_string());
+    line(
+        "explained",
+        format!("{}, by the chord error", report.within_chord_error),
+    );
+    line("disagree", report.disagree.to_string());
+    for d in &report.disagreements {
+        let at = d
+            .voxel
+            .map_or_else(String::new, |v| format!("voxel {v:?}, "));
+        let point = d.point.to_array();
+        line(
+            "",
+            format!(
+                "{at}{point:?}: exact {}, ray {}, winding {}",
+                d.inside, d.parity, d.winding
+            ),
+        );
+        for p in &d.parts {
+            line(
+                "",
+                format!(
+                    "  {:?}: exact {}, ray {}, winding {:.3}; distance {:e}, chord error {:e}",
+                    p.name, p.inside, p.parity, p.winding, p.distance, p.chord_error
+                ),
+            );
+        }
+    }
+    let f = &report.field;
+    let counts = |[looked, failed]: [u64; 2]| format!("{looked} checked, {failed} failed");
+    line("finite", format!("{} failed", f.not_finite));
+    line("sign", format!("{} failed", f.wrong_sign));
+    line("steepness", counts(f.steepness));
+    let gradient = f.gradient_max_error;
+    line(
+        "slope",
+        format!(
+            "{}, at most {gradient:.2e} from 1 away from the medial axis",
+            counts(f.slope)
+        ),
+    );
+    line("zero", counts(f.zero));
+    let most = f.distance_max_error;
+    line(
+        "distance",
+        format!(
+            "{}, at most {most:.3e} {units} from the triangles'",
+            counts(f.distance)
+        ),
+    );
+    for v in &f.violations {
+        let at = v
+            .voxel
+            .map_or_else(String::new, |v| format!("voxel {v:?}, "));
+        let point = v.point.to_array();
+        line(
+            "",
+            format!(
+                "{}: {at}{point:?}: {:e}, allowed {:e}",
+                v.check, v.off[0], v.off[1]
+            ),
+        );
+    }
+    line("ok", report.is_ok().to_string());
+    text
+}

@@ -1,0 +1,212 @@
+//! The report as a page that needs no other file.
+
+use super::Report;
+use std::fmt::Write;
+
+/// What a page says of where a report comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Heading<'a> {
+    /// The scene's name.
+    pub scene: &'a str,
+    /// BLAKE3 of the resolved scene.
+    pub hash: &'a str,
+    /// The scene's unit of length.
+    pub units: &'a str,
+    /// Voxels of the grid.
+    pub dims: [usize; 3],
+    /// Size of a voxel.
+    pub spacing: [f64; 3],
+}
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}\
+h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}table{border-collapse:collapse;width:100%}\
+th,td{text-align:left;padding:.3rem .6rem;border-bottom:1px solid #ddd;font-variant-numeric:tabular-nums}\
+.ok{color:#0b6e4f}.bad{color:#b3261e;font-weight:600}code{font-size:.85em}\
+@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}th,td{border-color:#333}.ok{color:#6cc7a5}.bad{color:#ff8a80}}";
+
+/// The report as a self-contained HTML page.
+#[must_use]
+pub fn page(report: &Report, heading: &Heading) -> String {
+    let title = format!("voxlathe validate: {}", escaped(heading.scene));
+    let [nx, ny, nz] = heading.dims;
+    let units = heading.units;
+    let mut html = format!(
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n\
+         <title>{title}</title>\n<style>{STYLE}</style>\n<h1>{title}</h1>\n\
+         <p class=\"{}\">{}</p>\n<p>{nx} × {ny} × {nz} voxels of {:?} {units}; scene <code>{}</code></p>\n",
+        if report.is_ok() { "ok" } else { "bad" },
+        if report.is_ok() {
+            "Everything agrees, or differs within the proven chord error."
+        } else {
+            "There are differences that nothing explains."
+        },
+        heading.spacing,
+        escaped(heading.hash)
+    );
+    html += &table(
+        "Membership",
+        &["points", "agree", "within chord error", "disagree"],
+        &[[
+            report.samples,
+            report.agree,
+            report.within_chord_error,
+            report.disagree,
+        ]
+        .map(|n| n.to_string())
+        .to_vec()],
+    );
+    let meshes: Vec<Vec<String>> = report
+        .meshes
+        .iter()
+        .map(|m| {
+            vec![
+                escaped(&m.name),
+                m.triangles.to_string(),
+                format!("{:.3e}", m.chord_error),
+                mark(m.closed),
+                m.euler_characteristic.to_string(),
+                m.volume.to_string(),
+            ]
+        })
+        .collect();
+    html += &table(
+        "Triangles",
+        &[
+            "solid",
+            "triangles",
+            "chord error",
+            "closed",
+            "Euler characteristic",
+            "volume",
+        ],
+        &meshes,
+    );
+    let f = &report.field;
+    let checks = [
+        ("finite", report.samples, f.not_finite),
+        (
+            "sign is that of the membership",
+            report.samples,
+            f.wrong_sign,
+        ),
+        ("no steeper than 1", f.steepness[0], f.steepness[1]),
+        ("slope 1 away from the medial axis", f.slope[0], f.slope[1]),
+        ("zero where the triangles are", f.zero[0], f.zero[1]),
+        ("distance to the triangles", f.distance[0], f.distance[1]),
+    ];
+    let checks: Vec<Vec<String>> = checks
+        .iter()
+        .map(|(name, looked, failed)| {
+            vec![
+                (*name).to_owned(),
+                looked.to_string(),
+                failed.to_string(),
+                mark(*failed == 0),
+            ]
+        })
+        .collect();
+    html += &table("Distance", &["check", "looked at", "failed", ""], &checks);
+    let _ = writeln!(
+        html,
+        "<p>Largest ||∇φ| − 1| away from the medial axis {:.2e}; largest difference from the distance to the triangles {:.2e} {units}.</p>",
+        f.gradient_max_error, f.distance_max_error
+    );
+    let points: Vec<Vec<String>> = report
+        .disagreements
+        .iter()
+        .flat_map(|d| {
+            d.parts.iter().map(move |p| {
+                vec![
+                    voxel(d.voxel),
+                    format!("{:?}", d.point.to_array()),
+                    format!("{} / {} / {}", d.inside, d.parity, d.winding),
+                    escaped(&p.name),
+                    format!("{} / {} / {:.3}", p.inside, p.parity, p.winding),
+                    format!("{:e} of {:e}", p.distance, p.chord_error),
+                ]
+            })
+        })
+        .collect();
+    if !points.is_empty() {
+        html += &table(
+            "Points where the answers differ",
+            &[
+                "voxel",
+                "point",
+                "exact / ray / winding",
+                "solid",
+                "exact / ray / winding",
+                "distance of chord error",
+            ],
+            &points,
+        );
+    }
+    let violations: Vec<Vec<String>> = f
+        .violations
+        .iter()
+        .map(|v| {
+            vec![
+                v.check.to_owned(),
+                voxel(v.voxel),
+                format!("{:?}", v.point.to_array()),
+                format!("{:e} of {:e}", v.off[0], v.off[1]),
+            ]
+        })
+        .collect();
+    if !violations.is_empty() {
+        html += &table(
+            "Values that no distance has",
+            &["check", "voxel", "point", "off, of what is allowed"],
+            &violations,
+        );
+    }
+    html + "</html>\n"
+}
+
+fn voxel(voxel: Option<[usize; 3]>) -> String {
+    voxel.map_or_else(|| "—".to_owned(), |v| format!("{v:?}"))
+}
+
+fn mark(good: bool) -> String {
+    let (class, text) = if good { ("ok", "yes") } else { ("bad", "no") };
+    format!("<span class=\"{class}\">{text}</span>")
+}
+
+fn table(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+    let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| -> String {
+        cells.map(|c| format!("<{tag}>{c}</{tag}>")).collect()
+    };
+    let mut html = format!("<h2>{title}</h2>\n<table>\n<tr>");
+    html += &cells("th", &mut head.iter().copied());
+    html += "</tr>\n";
+    for row in rows {
+        let _ = writeln!(
+            html,
+            "<tr>{}</tr>",
+            cells("td", &mut row.iter().map(String::as_str))
+        );
+    }
+    html + "</table>\n"
+}
+
+/// Text that means nothing to HTML.
+fn escaped(text: &str) -> String {
+    let one = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        _ => c.to_string(),
+    };
+    text.chars().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_text() {
+        assert_eq!(escaped("<b>&\"x\""), "&lt;b&gt;&amp;&quot;x&quot;");
+    }
+}
