@@ -121,13 +121,14 @@ impl<'a> Votes<'a> {
             } else {
                 mesh.tree.crossings_row(&xs, y, z, &mut crossings);
             }
+            let mut steady = Steady::default();
             for (i, &x) in xs.iter().enumerate() {
                 let point = DVec3::new(x, y, z);
                 compose(&mut parity[i], part.operation(), || {
                     crossings[i].is_inside()
                 });
                 compose(&mut winding[i], part.operation(), || {
-                    !misses && self.winds(n, point)
+                    !misses && steady.winds(self, n, point)
                 });
             }
         }
@@ -203,6 +204,28 @@ impl<'a> Votes<'a> {
                 }
             })
             .collect()
+    }
+}
+
+/// A point whose winding number is known, and how far around it no triangle is: the number of a
+/// closed mesh changes nowhere else.
+#[derive(Default)]
+struct Steady {
+    point: DVec3,
+    radius: f64,
+    winds: bool,
+}
+
+impl Steady {
+    fn winds(&mut self, votes: &Votes, n: usize, point: DVec3) -> bool {
+        if (point - self.point).length() >= self.radius {
+            let mesh = &votes.meshes[n];
+            self.point = point;
+            self.winds = votes.winds(n, point);
+            let nearest = mesh.tree.nearest(point).filter(|_| mesh.closed);
+            self.radius = nearest.map_or(0.0, |n| n.distance * (1.0 - 1e-9));
+        }
+        self.winds
     }
 }
 
