@@ -208,6 +208,29 @@ fn an_open_surface_has_a_winding_number_between() {
 }
 
 #[test]
+fn far_points_see_the_first_moment() {
+    // Of a closed surface nothing is left far away, of an open one the missing side.
+    let closed = cube(DVec3::new(0.3, -0.2, 0.1), 1.0);
+    let open = closed[4..].to_vec();
+    let mut random = uniform(19);
+    for triangles in [closed, open] {
+        let tree = MeshTree::from_triangles(&triangles);
+        for k in 0..400 {
+            let direction = (DVec3::new(random(), random(), random()) - 0.5).normalize();
+            let p = direction * 10f64.powf(0.5 + 2.5 * f64::from(k) / 400.0);
+            let exact = tree.winding_number(p, 0.0);
+            for accuracy in [1e-6, 1e-3, 0.1] {
+                let found = tree.winding_number(p, accuracy);
+                assert!(
+                    (found - exact).abs() <= accuracy,
+                    "{p}: {found} for {exact} within {accuracy}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn nearest_points_are_those_of_brute_force() {
     for name in ["torus", "goblet", "half_torus"] {
         let (scene, mesh) = meshed(name, 0.02);
