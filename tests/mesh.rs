@@ -84,10 +84,17 @@ fn every_shipped_solid_is_closed_and_its_volume_is_within_the_chord_error_of_the
 fn hard_profiles_close() {
     for (name, text) in hard::texts(true) {
         let scene = Scene::parse(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let size = scene.bounds().longest_side();
-        for share in [0.1, 1e-3] {
-            let mesh = only(&scene, share * size);
-            assert_eq!(mesh.unmatched_edge(), None, "{name} {share}");
+        for part in scene.assembly().parts() {
+            let size = part.bounds().longest_side();
+            for share in [0.1, 1e-3] {
+                let mesh =
+                    tessellate(part.body(), share * size).unwrap_or_else(|e| panic!("{name}: {e}"));
+                assert_eq!(mesh.unmatched_edge(), None, "{name} {share}");
+                let exact = part.measures();
+                let off = (mesh.volume() - exact.volume).abs();
+                let room = 2.0 * exact.area * mesh.chord_error() + 1e-9 * exact.volume;
+                assert!(off <= room, "{name} {share}: off by {off}, room {room}");
+            }
         }
     }
 }

@@ -194,8 +194,8 @@ mod tests {
         let found = triangles(&points, &loops);
         assert!(bounded_by(&found, &corner_chords(&loops)));
         assert_eq!(found.len(), 7 + 1);
-        let hole = 0.5 * f64::abs(1.0 * 3.0 - 3.0 * 1.0) + 0.5 * 4.0;
-        let wanted = 16.0 - hole - 0.0 + 0.25;
+        // The square less the hole, and the island.
+        let wanted = 16.0 - 6.0 + 0.25;
         assert!((area(&points, &loops, &found) - wanted).abs() < 1e-12);
         let corners: Vec<[f64; 2]> = loops
             .iter()
