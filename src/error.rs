@@ -2,6 +2,7 @@
 
 use crate::grid::GridError;
 use crate::io::IoError;
+use crate::picture::PictureError;
 use crate::scene::SceneError;
 
 /// What can go wrong.
@@ -17,6 +18,9 @@ pub enum Error {
     /// A file cannot be read or written, or is not what it should be.
     #[error(transparent)]
     Io(#[from] IoError),
+    /// A picture cannot be made.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// Something needs more memory or disk than there is.
     #[error("{what} needs {needed} bytes, and {available} are available; {remedy}")]
     TooLarge {

@@ -16,7 +16,7 @@
 //!   scene ──> region ──> solid ──> sample ──> io          cli drives them all
 //!               │          │         │
 //!             nurbs        │        grid
-//!               └── math ──┘
+//!               └── math ──┘              picture draws scenes
 //! ```
 //!
 //! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
@@ -27,6 +27,7 @@
 //!   row spans, volume fractions of voxels.
 //! * [`grid`]: where the voxels are; it knows no geometry.
 //! * [`sample`]: layers of occupancy, fraction, distance and material.
+//! * [`picture`]: shaded views, sections and contact sheets, from the exact distance.
 //! * [`io`]: the EXR stack with its manifest, tables of points; it knows no geometry.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
 //!
@@ -46,6 +47,7 @@ pub mod grid;
 pub mod io;
 pub mod math;
 pub mod nurbs;
+pub mod picture;
 pub mod region;
 pub mod sample;
 pub mod scene;
