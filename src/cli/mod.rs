@@ -10,6 +10,7 @@ mod interrupt;
 mod measure;
 mod output;
 mod query;
+mod render;
 mod voxelize;
 
 use arguments::{Arguments, Command};
@@ -59,6 +60,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Voxelize(a) => voxelize::run(a, common, console),
         Command::Query(a) => query::run(a, common, console),
         Command::Measure(a) => measure::run(a, common, console),
+        Command::Render(a) => render::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }

@@ -19,7 +19,9 @@ pub(super) fn has_room(width: usize, height: usize) -> bool {
 
 /// Widths of lines relative to those of a picture of 1200 by 900.
 pub(super) fn stroke(width: usize, height: usize) -> f64 {
-    (length(width) / 1200.0).min(length(height) / 900.0).max(0.5)
+    (length(width) / 1200.0)
+        .min(length(height) / 900.0)
+        .max(0.5)
 }
 
 /// The size of text in pixels.
@@ -96,7 +98,10 @@ pub(super) fn axes(canvas: &mut Canvas, [w, h]: [f32; 2], camera: &Camera) {
     let pen = Pen::solid(0.1 * size, ink());
     let axes = [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")];
     for (axis, name) in axes {
-        let flat = [single(axis.dot(camera.right) * arm), single(-axis.dot(camera.up) * arm)];
+        let flat = [
+            single(axis.dot(camera.right) * arm),
+            single(-axis.dot(camera.up) * arm),
+        ];
         let long = flat[0].hypot(flat[1]);
         // Seen end on, an axis has no direction.
         if long < 0.35 * size {
@@ -146,7 +151,13 @@ pub(super) fn materials(scene: &Scene, field: &Field<'_>) -> Vec<(String, Linear
 /// The materials in a row in the middle of the lower edge, as many as there is room for.
 pub(super) fn legend(canvas: &mut Canvas, [w, h]: [f32; 2], entries: &[(String, Linear)]) {
     let size = text_size(w, h);
-    row(canvas, [7.5 * size, 0.72 * w], h - 1.5 * size, size, entries);
+    row(
+        canvas,
+        [7.5 * size, 0.72 * w],
+        h - 1.5 * size,
+        size,
+        entries,
+    );
 }
 
 /// A row of swatches with names, centred between two places.
@@ -175,7 +186,14 @@ pub(super) fn row(
         canvas.rectangle(low, [x + side, baseline], *fill);
         canvas.frame(low, [x + side, baseline], Pen::solid(0.06 * size, ink()));
         let place = (Align::Start, Run::Right);
-        text::draw(canvas, name, small, [x + 1.15 * small, baseline], place, ink());
+        text::draw(
+            canvas,
+            name,
+            small,
+            [x + 1.15 * small, baseline],
+            place,
+            ink(),
+        );
         x += each(name);
     }
 }

@@ -135,10 +135,7 @@ pub fn render(
                     return Err(Error::Interrupted);
                 }
                 let corner = [n % columns * TILE, n / columns * TILE];
-                let size = [
-                    TILE.min(width - corner[0]),
-                    TILE.min(height - corner[1]),
-                ];
+                let size = [TILE.min(width - corner[0]), TILE.min(height - corner[1])];
                 Ok((corner, size, painter.tile(probes, corner, size)))
             },
         )
@@ -164,11 +161,7 @@ pub fn render(
 }
 
 /// The camera that shows all of the solid, with room around it.
-fn frame(
-    field: &Field<'_>,
-    options: &RenderOptions,
-    cancel: Cancel<'_>,
-) -> Result<Camera, Error> {
+fn frame(field: &Field<'_>, options: &RenderOptions, cancel: Cancel<'_>) -> Result<Camera, Error> {
     let size = [length(options.width), length(options.height)];
     let middle = 0.5 * (field.bounds.min + field.bounds.max);
     // A square around the box from any side.
@@ -302,8 +295,7 @@ impl Painter<'_> {
                 let own = around(1, 1);
                 let sides = [around(0, 1), around(2, 1), around(1, 0), around(1, 2)];
                 colours.push(if own.thin || sides.iter().any(|s| self.differ(own, s)) {
-                    let near: Vec<&Sample> =
-                        (0..9).map(|n| around(n % 3, n / 3)).collect();
+                    let near: Vec<&Sample> = (0..9).map(|n| around(n % 3, n / 3)).collect();
                     let at = [length(corner[0] + x), length(corner[1] + y)];
                     self.fine(probes, at, block(x, y), &near)
                 } else {
@@ -442,7 +434,8 @@ impl Painter<'_> {
 
     /// The place of the material under a surface.
     fn place(&self, point: DVec3, normal: DVec3) -> usize {
-        self.field.material(point - normal * (1e-7 * self.field.size))
+        self.field
+            .material(point - normal * (1e-7 * self.field.size))
     }
 
     /// The light at a point, from a neighbour on the same surface where there is one.
@@ -453,9 +446,8 @@ impl Painter<'_> {
         (kind, point, normal, t): (u32, DVec3, DVec3, f64),
     ) -> Lit {
         let reach = 6.0 * self.camera.scale();
-        let alike = |s: &&&Sample| {
-            s.kind == kind && (s.t - t).abs() < reach && s.normal.dot(normal) > 0.8
-        };
+        let alike =
+            |s: &&&Sample| s.kind == kind && (s.t - t).abs() < reach && s.normal.dot(normal) > 0.8;
         let off = |s: &Sample| (s.t - t).abs() + reach * (1.0 - s.normal.dot(normal));
         let best = near
             .unwrap_or_default()

@@ -268,16 +268,17 @@ pub fn section(
 }
 
 /// Sizes of the picture and of the plot in it.
-fn lay_out(
-    field: &Field<'_>,
-    options: &SectionOptions,
-) -> Result<Layout, PictureError> {
+fn lay_out(field: &Field<'_>, options: &SectionOptions) -> Result<Layout, PictureError> {
     /// Pixels of the longer side of the plot.
     const LONG: f64 = 900.0;
     let sides = options.plane.axis.flat().map(|a| field.bounds.sides()[a]);
     let longest = sides[0].max(sides[1]);
     let shape = sides.map(|s| (s / longest).clamp(0.45, 1.0) * LONG);
-    let rows = if field.materials().len() > 1 { 2.0 } else { 0.0 };
+    let rows = if field.materials().len() > 1 {
+        2.0
+    } else {
+        0.0
+    };
     // Left, top, right and bottom of the plot, in sizes of the text.
     let around = [5.6, 2.4, 8.6, 5.2 + rows];
     let wanted = options.annotations;
@@ -467,7 +468,9 @@ impl Drawing<'_> {
                 .any(|v| v.material != 0 && v.material != own.material);
         // A pixel whose middle is outside takes the material next to it.
         let place = if own.material == 0 {
-            neighbours.find(|v| v.material != 0).map_or(1, |v| v.material)
+            neighbours
+                .find(|v| v.material != 0)
+                .map_or(1, |v| v.material)
         } else {
             own.material
         } as usize

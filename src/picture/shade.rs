@@ -188,7 +188,13 @@ impl Face {
     /// * `place`: that of the material; each has its own slope of the hatching.
     /// * `depth`: distance to the surface.
     /// * `screen`: the camera's axes, right, up and forward.
-    pub(super) fn colour(&self, point: DVec3, place: usize, depth: f64, screen: [DVec3; 3]) -> Linear {
+    pub(super) fn colour(
+        &self,
+        point: DVec3,
+        place: usize,
+        depth: f64,
+        screen: [DVec3; 3],
+    ) -> Linear {
         let own = colour::material(place);
         let tint = mix(own, [1.0; 3], 0.52);
         let ink = mix(own, [0.0; 3], 0.55);
@@ -210,7 +216,11 @@ impl Face {
         let line = (0.5 * width + 0.5 - off).clamp(0.0, 1.0);
         let mean = (width * speed / period).min(1.0);
         let resolved = ((period / speed - 2.0) / 2.0).clamp(0.0, 1.0);
-        found = mix(found, ink, single(0.75 * (resolved * line + (1.0 - resolved) * mean)));
+        found = mix(
+            found,
+            ink,
+            single(0.75 * (resolved * line + (1.0 - resolved) * mean)),
+        );
         let border = (1.5 * self.stroke + 0.5 - depth / self.pixel).clamp(0.0, 1.0);
         mix(found, colour::linear(colour::INK), single(border))
     }

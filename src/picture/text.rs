@@ -119,8 +119,7 @@ mod tests {
     use super::*;
 
     /// Every character that pictures may have.
-    const ALL: &str =
-        "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ+\u{2212}.,:;=()/^\
+    const ALL: &str = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ+\u{2212}.,:;=()/^\
          \u{b5}\u{d7}\u{2070}\u{b9}\u{b2}\u{b3}\u{2074}\u{2075}\u{2076}\u{2077}\u{2078}\u{2079}\u{207b}";
 
     fn drawn(text: &str, run: Run) -> Vec<u8> {
@@ -150,7 +149,10 @@ mod tests {
             }
         }
         let missing = drawn("\u{e000}", Run::Right);
-        assert!(!seen.contains_key(&missing), "a character is not in the font");
+        assert!(
+            !seen.contains_key(&missing),
+            "a character is not in the font"
+        );
     }
 
     #[test]
@@ -186,7 +188,10 @@ mod tests {
         let rows: Vec<usize> = (0..120).filter(|&y| dark(y)).collect();
         let high = rows.len();
         let wanted = cap_height(100.0);
-        assert!((super::super::canvas::centre(high) - 0.5 - wanted).abs() <= 1.0, "{high}");
+        assert!(
+            (super::super::canvas::centre(high) - 0.5 - wanted).abs() <= 1.0,
+            "{high}"
+        );
         assert_eq!(rows[rows.len() - 1], 99);
     }
 }

@@ -44,7 +44,13 @@ const LEAST_STEP: f64 = 0.02;
 /// Follows a ray from `from` on.
 ///
 /// * `pixel`: scene units for a pixel.
-pub(super) fn trace(field: &Field<'_>, probe: &mut Probe, ray: Ray, from: f64, pixel: f64) -> Meets {
+pub(super) fn trace(
+    field: &Field<'_>,
+    probe: &mut Probe,
+    ray: Ray,
+    from: f64,
+    pixel: f64,
+) -> Meets {
     let Some([enters, leaves]) = field.span(ray.origin, ray.direction, 0.0) else {
         return Meets::Nothing(f64::INFINITY);
     };
