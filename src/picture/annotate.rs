@@ -29,10 +29,16 @@ pub(super) fn text_size(width: f32, height: f32) -> f32 {
     (width.min(1.35 * height) / 50.0).max(11.0)
 }
 
-/// The height at the bottom of a picture that is kept for what is written, in pixels.
-pub(super) fn band(width: usize, height: usize) -> f64 {
-    let size = [width, height].map(|n| single(length(n)));
-    f64::from(3.0 * text_size(size[0], size[1]))
+/// The height at the bottom of a shaded picture that is kept for what is written, in pixels.
+pub(super) fn band([w, h]: [f32; 2], entries: &[(String, Linear)]) -> f64 {
+    let size = text_size(w, h);
+    let lines = wrapped(legend_span(w, size), size, entries).len().max(1);
+    f64::from((1.7 + 1.3 * single(length(lines))) * size)
+}
+
+/// Between what a shaded picture's legend has room: beside the axes and the scale bar.
+fn legend_span(width: f32, size: f32) -> [f32; 2] {
+    [7.5 * size, 0.76 * width]
 }
 
 pub(super) fn ink() -> Linear {
@@ -148,52 +154,73 @@ pub(super) fn materials(scene: &Scene, field: &Field<'_>) -> Vec<(String, Linear
     names.zip(colours).collect()
 }
 
-/// The materials in a row in the middle of the lower edge, as many as there is room for.
+/// The names of materials at the lower edge of a shaded picture.
 pub(super) fn legend(canvas: &mut Canvas, [w, h]: [f32; 2], entries: &[(String, Linear)]) {
     let size = text_size(w, h);
-    row(
-        canvas,
-        [7.5 * size, 0.72 * w],
-        h - 1.5 * size,
-        size,
-        entries,
-    );
+    rows(canvas, legend_span(w, size), h - 1.5 * size, size, entries);
 }
 
-/// A row of swatches with names, centred between two places.
-pub(super) fn row(
-    canvas: &mut Canvas,
+/// How long an entry of a legend is.
+fn entry(name: &str, small: f32) -> f32 {
+    2.0 * small + text::width(name, small)
+}
+
+/// The size of a legend's text.
+fn legend_text(size: f32) -> f32 {
+    0.82 * size
+}
+
+/// Entries in lines that are not longer than there is room.
+fn wrapped<'a>(
     [from, to]: [f32; 2],
+    size: f32,
+    entries: &'a [(String, Linear)],
+) -> Vec<&'a [(String, Linear)]> {
+    let small = legend_text(size);
+    let mut lines = Vec::new();
+    let (mut start, mut total) = (0, 0.0);
+    for (n, (name, _)) in entries.iter().enumerate() {
+        let long = entry(name, small);
+        if n > start && total + long > to - from {
+            lines.push(&entries[start..n]);
+            (start, total) = (n, 0.0);
+        }
+        total += long;
+    }
+    if start < entries.len() {
+        lines.push(&entries[start..]);
+    }
+    // More would be taller than the picture they explain.
+    lines.truncate(4);
+    lines
+}
+
+/// How many lines a legend takes.
+pub(super) fn lines(span: [f32; 2], size: f32, entries: &[(String, Linear)]) -> usize {
+    wrapped(span, size, entries).len()
+}
+
+/// Swatches with names in centred lines between two places, the last at `baseline`.
+pub(super) fn rows(
+    canvas: &mut Canvas,
+    span: [f32; 2],
     baseline: f32,
     size: f32,
     entries: &[(String, Linear)],
 ) {
-    let small = 0.82 * size;
-    let each = |name: &str| 1.9 * small + text::width(name, small);
-    let mut shown = 0;
-    let mut total = 0.0;
-    for (name, _) in entries {
-        if total + each(name) > to - from {
-            break;
+    let small = legend_text(size);
+    for (n, line) in wrapped(span, size, entries).iter().rev().enumerate() {
+        let total: f32 = line.iter().map(|(name, _)| entry(name, small)).sum();
+        let mut x = span[0] + 0.5 * (span[1] - span[0] - total + small);
+        let y = baseline - 1.3 * size * single(length(n));
+        for (name, fill) in *line {
+            let side = 0.8 * small;
+            canvas.rectangle([x, y - side], [x + side, y], *fill);
+            let pen = Pen::solid(0.06 * size, ink());
+            canvas.frame([x, y - side], [x + side, y], pen);
+            let place = (Align::Start, Run::Right);
+            text::draw(canvas, name, small, [x + 1.15 * small, y], place, ink());
+            x += entry(name, small);
         }
-        total += each(name);
-        shown += 1;
-    }
-    let mut x = from + 0.5 * (to - from - total);
-    for (name, fill) in &entries[..shown] {
-        let side = 0.8 * small;
-        let low = [x, baseline - side];
-        canvas.rectangle(low, [x + side, baseline], *fill);
-        canvas.frame(low, [x + side, baseline], Pen::solid(0.06 * size, ink()));
-        let place = (Align::Start, Run::Right);
-        text::draw(
-            canvas,
-            name,
-            small,
-            [x + 1.15 * small, baseline],
-            place,
-            ink(),
-        );
-        x += each(name);
     }
 }

@@ -47,10 +47,6 @@ impl Canvas {
         &mut self.pixels[y * self.width..(y + 1) * self.width]
     }
 
-    pub(super) fn set(&mut self, x: usize, y: usize, colour: Linear) {
-        self.pixels[y * self.width + x] = colour;
-    }
-
     /// Lays a colour over a pixel; outside the picture nothing happens.
     pub(super) fn blend(&mut self, x: isize, y: isize, colour: Linear, share: f32) {
         let inside = |v: isize, n: usize| usize::try_from(v).ok().filter(|&v| v < n);
@@ -322,7 +318,7 @@ mod tests {
     #[test]
     fn a_png_holds_the_pixels() {
         let mut canvas = Canvas::new(3, 2, linear([10, 20, 30]));
-        canvas.set(2, 1, linear([250, 0, 128]));
+        canvas.blend(2, 1, linear([250, 0, 128]), 1.0);
         let picture = canvas.finish(false);
         let bytes = picture.to_png().unwrap();
         let back = image::load_from_memory(&bytes).unwrap().to_rgb8();

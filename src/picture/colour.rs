@@ -104,15 +104,15 @@ pub fn to_oklab([r, g, b]: Linear) -> [f32; 3] {
 /// Lightness where the diverging map is neutral.
 const NEUTRAL: f32 = 0.965;
 /// Lightness at its ends.
-const END: f32 = 0.44;
+const END: f32 = 0.50;
 /// Chroma at its ends: the most that both hues have at that lightness on a screen.
-const CHROMA: f32 = 0.105;
+const CHROMA: f32 = 0.115;
 /// Hues of the negative and the positive end, in degrees.
 const HUES: [f32; 2] = [252.0, 48.0];
 
 /// The diverging map: -1 is blue, 0 neutral, 1 orange; beyond, the ends.
 ///
-/// Lightness is even in `t` and falls linearly from 0.965 to 0.44; equal steps of `t` are equal
+/// Lightness is even in `t` and falls linearly from 0.965 to 0.5; equal steps of `t` are equal
 /// steps in Oklab within 7 per cent.
 ///
 /// ```

@@ -10,7 +10,7 @@ use super::canvas::{Canvas, Picture, length, single};
 use super::colour::{self, Linear, mix};
 use super::error::PictureError;
 use super::field::{Cut, CutAway, Field};
-use super::shade::{Face, Lights, Lit, Probes};
+use super::shade::{Lights, Lit, Probes, face_colour};
 use super::trace::{Meets, Ray, clear, trace};
 use crate::error::Error;
 use crate::sample::Cancel;
@@ -118,7 +118,7 @@ pub fn render(
     let field = Field::new(assembly, cut);
     let floor = (options.view.elevation() > 1.0).then_some(assembly.bounds().min.z);
     let stroke = annotate::stroke(width, height);
-    let camera = frame(&field, options, cancel)?;
+    let camera = frame(scene, &field, options, cancel)?;
     let painter = Painter {
         field: &field,
         camera,
@@ -161,7 +161,12 @@ pub fn render(
 }
 
 /// The camera that shows all of the solid, with room around it.
-fn frame(field: &Field<'_>, options: &RenderOptions, cancel: Cancel<'_>) -> Result<Camera, Error> {
+fn frame(
+    scene: &Scene,
+    field: &Field<'_>,
+    options: &RenderOptions,
+    cancel: Cancel<'_>,
+) -> Result<Camera, Error> {
     let size = [length(options.width), length(options.height)];
     let middle = 0.5 * (field.bounds.min + field.bounds.max);
     // A square around the box from any side.
@@ -207,7 +212,8 @@ fn frame(field: &Field<'_>, options: &RenderOptions, cancel: Cancel<'_>) -> Resu
     }
     let written = options.annotations && annotate::has_room(options.width, options.height);
     let below = if written {
-        annotate::band(options.width, options.height)
+        let size = size.map(single);
+        annotate::band(size, &annotate::materials(scene, field))
     } else {
         0.0
     };
@@ -226,15 +232,34 @@ fn frame(field: &Field<'_>, options: &RenderOptions, cancel: Cancel<'_>) -> Resu
 /// What a ray saw.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    colour: Linear,
-    /// What was met: 0 background, 1 the floor, then materials twice each: surface and section.
-    kind: u32,
+    kind: Kind,
+    point: DVec3,
     normal: DVec3,
     /// Distance along the ray.
     t: f64,
-    lit: Lit,
+    /// The light there, once it is known.
+    lit: Option<Lit>,
     /// Whether one ray cannot tell what the pixel shows.
     thin: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Background,
+    Floor,
+    /// The surface of a material, by its place.
+    Surface(usize),
+    /// A face of the cut, its material and its colour.
+    Section(usize, Linear),
+}
+
+impl Kind {
+    fn is_like(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Section(a, _), Self::Section(b, _)) => a == b,
+            _ => self == other,
+        }
+    }
 }
 
 struct Painter<'a> {
@@ -278,44 +303,104 @@ impl Painter<'_> {
         }
         let block = |x: usize, y: usize| starts[(y / BLOCK) * blocks[0] + x / BLOCK];
         // One pixel more on every side, so that edges between tiles are seen from both.
-        let wide = size[0] + 2;
-        let mut samples = Vec::with_capacity(wide * (size[1] + 2));
-        for y in 0..size[1] + 2 {
+        let (wide, high) = (size[0] + 2, size[1] + 2);
+        let mut samples = Vec::with_capacity(wide * high);
+        for y in 0..high {
             for x in 0..wide {
                 let at = [length(corner[0] + x) - 0.5, length(corner[1] + y) - 0.5];
                 let inner = |v: usize, n: usize| v.clamp(1, n) - 1;
                 let from = block(inner(x, size[0]), inner(y, size[1]));
-                samples.push(self.sample(probes, at, from, None));
+                samples.push(self.look(probes, at, from));
             }
         }
+        self.light(probes, &mut samples, wide);
         let mut colours = Vec::with_capacity(size[0] * size[1]);
         for y in 0..size[1] {
             for x in 0..size[0] {
                 let around = |dx: usize, dy: usize| &samples[(y + dy) * wide + x + dx];
                 let own = around(1, 1);
                 let sides = [around(0, 1), around(2, 1), around(1, 0), around(1, 2)];
-                colours.push(if own.thin || sides.iter().any(|s| self.differ(own, s)) {
+                colours.push(if own.thin || sides.iter().any(|s| self.is_edge(own, s)) {
                     let near: Vec<&Sample> = (0..9).map(|n| around(n % 3, n / 3)).collect();
                     let at = [length(corner[0] + x), length(corner[1] + y)];
                     self.fine(probes, at, block(x, y), &near)
                 } else {
-                    own.colour
+                    self.colour(own, own.lit.unwrap_or_default())
                 });
             }
         }
         colours
     }
 
+    /// Finds the light of a tile's samples: that of every second one in both directions, and of
+    /// others where the ones between which they lie are not of the same surface.
+    fn light(&self, probes: &mut Probes, samples: &mut [Sample], wide: usize) {
+        let high = samples.len() / wide;
+        // Tiles start at even pixels, so the first row and column are odd.
+        let known = |v: usize| v % 2 == 1;
+        for y in (1..high).step_by(2) {
+            for x in (1..wide).step_by(2) {
+                let own = samples[y * wide + x];
+                samples[y * wide + x].lit = Some(self.lit(probes, &own, &[]));
+            }
+        }
+        for y in 0..high {
+            for x in 0..wide {
+                if known(x) && known(y) {
+                    continue;
+                }
+                let own = samples[y * wide + x];
+                let span = |v: usize, n: usize| {
+                    if known(v) {
+                        v..=v
+                    } else {
+                        v.saturating_sub(1)..=(v + 1).min(n - 1)
+                    }
+                };
+                let (mut sum, mut count, mut all) = (Lit::default(), 0.0_f32, true);
+                for j in span(y, high) {
+                    for i in span(x, wide) {
+                        if !(known(i) && known(j)) {
+                            continue;
+                        }
+                        let other = &samples[j * wide + i];
+                        all &= self.is_alike(&own, other);
+                        let lit = other.lit.unwrap_or_default();
+                        sum.key += lit.key;
+                        sum.ambient += lit.ambient;
+                        count += 1.0;
+                    }
+                }
+                samples[y * wide + x].lit = Some(if all && count > 0.0 {
+                    Lit {
+                        key: sum.key / count,
+                        ambient: sum.ambient / count,
+                    }
+                } else {
+                    self.lit(probes, &own, &[])
+                });
+            }
+        }
+    }
+
+    /// Whether two samples are near each other on one surface, so that light changes little.
+    fn is_alike(&self, a: &Sample, b: &Sample) -> bool {
+        a.kind.is_like(b.kind)
+            && a.normal.dot(b.normal) > 0.9
+            && (a.point - b.point).length() < 24.0 * self.camera.scale()
+    }
+
     /// Whether an edge passes between two neighbours.
-    fn differ(&self, a: &Sample, b: &Sample) -> bool {
-        if a.kind != b.kind {
+    fn is_edge(&self, a: &Sample, b: &Sample) -> bool {
+        if !a.kind.is_like(b.kind) {
             return true;
+        }
+        if !matches!(a.kind, Kind::Surface(_) | Kind::Section(..)) {
+            return false;
         }
         // Of one surface, the depth changes by its slope.
         let slope = a.normal.dot(self.camera.forward).abs().max(0.05);
-        a.kind > 1
-            && (a.normal.dot(b.normal) < 0.96
-                || (a.t - b.t).abs() > 4.0 * self.camera.scale() / slope)
+        a.normal.dot(b.normal) < 0.96 || (a.t - b.t).abs() > 4.0 * self.camera.scale() / slope
     }
 
     /// The mean colour of a pixel by many rays.
@@ -325,22 +410,18 @@ impl Painter<'_> {
         let mut sum = [0.0; 3];
         for n in 0..RAYS {
             let place = [0, 1].map(|a| at[a] + (0.5 + STEP[a] * length(n)).fract());
-            let found = self.sample(probes, place, from, Some(near));
+            let found = self.look(probes, place, from);
+            let lit = self.lit(probes, &found, near);
+            let colour = self.colour(&found, lit);
             for c in 0..3 {
-                sum[c] += found.colour[c];
+                sum[c] += colour[c];
             }
         }
         sum.map(|v| v / single(length(RAYS)))
     }
 
-    /// What a ray sees. Light is taken from neighbours that see the same, where they are given.
-    fn sample(
-        &self,
-        probes: &mut Probes,
-        [x, y]: [f64; 2],
-        from: f64,
-        near: Option<&[&Sample]>,
-    ) -> Sample {
+    /// What a ray sees.
+    fn look(&self, probes: &mut Probes, [x, y]: [f64; 2], from: f64) -> Sample {
         let ray = self.ray(x, y);
         let pixel = self.camera.scale();
         let meets = if from < f64::INFINITY {
@@ -352,111 +433,108 @@ impl Painter<'_> {
             Meets::Surface(t) => {
                 let point = ray.at(t);
                 let normal = self.field.normal(&mut probes.far, point);
-                let place = self.place(point, normal);
-                let kind = 2 + 2 * u32::try_from(place).unwrap_or(0);
-                let lit = self.lit(probes, near, (kind, point, normal, t));
-                let albedo = mix(colour::material(place), [1.0; 3], 0.10);
                 Sample {
-                    colour: self.lights.surface(albedo, normal, lit),
-                    kind,
+                    kind: Kind::Surface(self.place(point, normal)),
+                    point,
                     normal,
                     t,
-                    lit,
+                    lit: None,
                     thin: false,
                 }
             }
-            Meets::Section(t, normal) => {
-                let point = ray.at(t);
-                let depth = -self.field.distance(&mut probes.far, point);
-                let place = self.place(point, normal);
-                let (right, up) = (self.camera.right, self.camera.up);
-                let beside = [right, -right, up, -up];
-                let kind = 3 + 2 * u32::try_from(place).unwrap_or(0);
-                let face = Face {
-                    normal,
-                    pixel,
-                    stroke: self.stroke,
-                };
-                let mut seen = face.colour(point, place, depth, [right, up, ray.direction]);
-                // A line where two materials meet.
-                let border = self.field.materials().len() > 1
-                    && beside.iter().any(|d| {
-                        let flat = *d - normal * normal.dot(*d);
-                        let p = point + flat * (0.7 * self.stroke * pixel);
-                        self.field.assembly.contains(p) && self.field.material(p) != place
-                    });
-                if border {
-                    seen = colour::linear(colour::INK);
-                }
-                Sample {
-                    colour: seen,
-                    kind,
-                    normal,
-                    t,
-                    lit: Lit::default(),
-                    thin: border,
-                }
-            }
-            Meets::Nothing(nearest) => self.behind(probes, ray, near, nearest < pixel),
+            Meets::Section(t, normal) => self.face(probes, [x, y], ray.at(t), (t, normal)),
+            Meets::Nothing(nearest) => self.behind(ray, nearest < pixel),
+        }
+    }
+
+    /// A face of the cut.
+    fn face(
+        &self,
+        probes: &mut Probes,
+        at: [f64; 2],
+        point: DVec3,
+        (t, normal): (f64, DVec3),
+    ) -> Sample {
+        let pixel = self.camera.scale();
+        let depth = -self.field.distance(&mut probes.far, point);
+        // How far it is to the border in the face, where the surface leans.
+        let reach = 4.0 * self.stroke * pixel;
+        let off = if depth < reach {
+            let leans = self.field.normal(&mut probes.far, point).dot(normal);
+            depth / (1.0 - leans * leans).max(0.0).sqrt().max(0.02)
+        } else {
+            reach
+        };
+        let place = self.place(point, normal);
+        let (right, up) = (self.camera.right, self.camera.up);
+        let borders = self.field.materials().len() > 1
+            && [right, -right, up, -up].iter().any(|d| {
+                let flat = *d - normal * normal.dot(*d);
+                let p = point + flat * (0.7 * self.stroke * pixel);
+                self.field.assembly.contains(p) && self.field.material(p) != place
+            });
+        let colour = if borders {
+            colour::linear(colour::INK)
+        } else {
+            face_colour(at, place, off / pixel, self.stroke)
+        };
+        Sample {
+            kind: Kind::Section(place, colour),
+            point,
+            normal,
+            t,
+            lit: None,
+            thin: borders,
         }
     }
 
     /// The floor or the background.
-    fn behind(
-        &self,
-        probes: &mut Probes,
-        ray: Ray,
-        near: Option<&[&Sample]>,
-        thin: bool,
-    ) -> Sample {
-        let mut seen = Sample {
-            colour: colour::linear(colour::BACKGROUND),
-            kind: 0,
-            normal: DVec3::Z,
-            t: f64::INFINITY,
-            lit: Lit {
-                key: 1.0,
-                ambient: 1.0,
-            },
-            thin,
+    fn behind(&self, ray: Ray, thin: bool) -> Sample {
+        let floor = self
+            .lights
+            .floor
+            .filter(|_| !self.field.assembly.is_empty());
+        let (kind, t) = match floor {
+            Some(floor) => (Kind::Floor, (floor - ray.origin.z) / ray.direction.z),
+            None => (Kind::Background, 0.0),
         };
-        if let Some(floor) = self.lights.floor
-            && !self.field.assembly.is_empty()
-        {
-            let t = (floor - ray.origin.z) / ray.direction.z;
-            let point = ray.at(t);
-            (seen.kind, seen.t) = (1, t);
-            let lit = self.lit(probes, near, (1, point, DVec3::Z, t));
-            (seen.lit, seen.colour) = (lit, Lights::floor(lit));
+        Sample {
+            kind,
+            point: ray.at(t),
+            normal: DVec3::Z,
+            t,
+            lit: None,
+            thin,
         }
-        seen
     }
 
     /// The place of the material under a surface.
     fn place(&self, point: DVec3, normal: DVec3) -> usize {
         self.field
-            .material(point - normal * (1e-7 * self.field.size))
+            .material(point - normal * (2e-7 * self.field.size))
     }
 
-    /// The light at a point, from a neighbour on the same surface where there is one.
-    fn lit(
-        &self,
-        probes: &mut Probes,
-        near: Option<&[&Sample]>,
-        (kind, point, normal, t): (u32, DVec3, DVec3, f64),
-    ) -> Lit {
-        let reach = 6.0 * self.camera.scale();
-        let alike =
-            |s: &&&Sample| s.kind == kind && (s.t - t).abs() < reach && s.normal.dot(normal) > 0.8;
-        let off = |s: &Sample| (s.t - t).abs() + reach * (1.0 - s.normal.dot(normal));
-        let best = near
-            .unwrap_or_default()
-            .iter()
-            .filter(alike)
-            .min_by(|a, b| off(a).total_cmp(&off(b)));
-        match best {
-            Some(neighbour) => neighbour.lit,
-            None => self.lights.at(self.field, probes, point, normal),
+    /// The light at a sample, from a neighbour on the same surface where there is one.
+    fn lit(&self, probes: &mut Probes, own: &Sample, near: &[&Sample]) -> Lit {
+        if !matches!(own.kind, Kind::Surface(_) | Kind::Floor) {
+            return Lit::default();
+        }
+        let off = |s: &Sample| (s.point - own.point).length_squared();
+        let alike = near.iter().filter(|s| self.is_alike(own, s));
+        let best = alike.min_by(|a, b| off(a).total_cmp(&off(b)));
+        best.and_then(|s| s.lit)
+            .unwrap_or_else(|| self.lights.at(self.field, probes, own.point, own.normal))
+    }
+
+    fn colour(&self, own: &Sample, lit: Lit) -> Linear {
+        match own.kind {
+            Kind::Background => colour::linear(colour::BACKGROUND),
+            Kind::Floor => Lights::floor(lit),
+            Kind::Surface(place) => {
+                let albedo = mix(colour::material(place), [1.0; 3], 0.10);
+                self.lights.surface(albedo, own.normal, lit)
+            }
+            Kind::Section(_, colour) => colour,
         }
     }
 }

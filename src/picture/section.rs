@@ -23,7 +23,7 @@ use super::colour::{self, Linear, diverging, mix};
 use super::error::PictureError;
 use super::field::Field;
 use super::render::{MAX_SIDE, check_size};
-use super::shade::hatch_angle;
+use super::shade::hatching;
 use super::text::{self, Align, Run};
 use super::ticks::{Labels, multiples, round_step};
 use crate::error::Error;
@@ -228,7 +228,7 @@ pub fn section(
         return Err(PictureError::Isolines { found, hint }.into());
     }
     let field = Field::new(scene.assembly(), None);
-    let layout = lay_out(&field, options)?;
+    let layout = lay_out(scene, &field, options)?;
     let window = window(&field, options.plane, &layout);
     let values = values(&field, options.plane, &window, cancel)?;
     let reach = |sign: f64| {
@@ -268,16 +268,23 @@ pub fn section(
 }
 
 /// Sizes of the picture and of the plot in it.
-fn lay_out(field: &Field<'_>, options: &SectionOptions) -> Result<Layout, PictureError> {
+fn lay_out(
+    scene: &Scene,
+    field: &Field<'_>,
+    options: &SectionOptions,
+) -> Result<Layout, PictureError> {
     /// Pixels of the longer side of the plot.
     const LONG: f64 = 900.0;
     let sides = options.plane.axis.flat().map(|a| field.bounds.sides()[a]);
     let longest = sides[0].max(sides[1]);
     let shape = sides.map(|s| (s / longest).clamp(0.45, 1.0) * LONG);
-    let rows = if field.materials().len() > 1 {
-        2.0
-    } else {
-        0.0
+    let names = annotate::materials(scene, field);
+    let default_text: f32 = 19.0;
+    // The lines that the names take in the default size, where they have most of the width.
+    let span = [0.0, single(shape[0]) + 9.0 * default_text];
+    let rows = match annotate::lines(span, default_text, &names) {
+        0 => 0.0,
+        n => 0.7 + 1.3 * length(n),
     };
     // Left, top, right and bottom of the plot, in sizes of the text.
     let around = [5.6, 2.4, 8.6, 5.2 + rows];
@@ -292,7 +299,7 @@ fn lay_out(field: &Field<'_>, options: &SectionOptions) -> Result<Layout, Pictur
             [0.0; 2]
         }
     };
-    let default_text = 19.0;
+    let default_text = f64::from(default_text);
     let extra = scaled(default_text);
     let natural = [shape[0] + extra[0], shape[1] + extra[1]];
     let pixels = |v: f64| whole(single(v.round().clamp(1.0, length(MAX_SIDE))));
@@ -445,8 +452,8 @@ impl Drawing<'_> {
             // Lines nearer than a few pixels would fill the plot.
             let share = ((apart - 3.0) / 3.0).clamp(0.0, 1.0);
             if n != 0.0 {
-                let half = if n % 5.0 == 0.0 { 0.8 } else { 0.45 } * self.stroke;
-                let strength = if n % 5.0 == 0.0 { 0.72 } else { 0.5 };
+                let half = if n % 5.0 == 0.0 { 0.85 } else { 0.5 } * self.stroke;
+                let strength = if n % 5.0 == 0.0 { 0.8 } else { 0.55 };
                 let cover = share * strength * line(half, off(n * self.step));
                 found = mix(found, ink(), cover);
             }
@@ -476,12 +483,8 @@ impl Drawing<'_> {
         } as usize
             - 1;
         let colour = colour::material(place);
-        let angle = hatch_angle(place).to_radians();
-        let (px, py) = (length(x) + 0.5, length(self.window.size[1] - y) - 0.5);
-        let period = f64::from(8.5 * self.stroke);
-        let phase = (py * angle.cos() - px * angle.sin()) / period;
-        let off = single((phase - phase.round()).abs() * period);
-        let line = (0.55 * self.stroke + 0.5 - off).clamp(0.0, 1.0);
+        let at = [length(x) + 0.5, length(self.window.size[1] - y) - 0.5];
+        let line = hatching(at, place, f64::from(self.stroke));
         let tinted = mix(base, colour, 0.30);
         let mut found = mix(tinted, mix(colour, [0.0; 3], 0.30), 0.85 * line);
         if borders {
@@ -526,46 +529,49 @@ impl Drawing<'_> {
             dashes: &dashes,
             ..Pen::solid(1.3 * unit, ink())
         };
-        let mut drawn: Vec<([f64; 2], [f64; 2])> = Vec::new();
+        let mut lines: Vec<CentreLine> = Vec::new();
         for part in self.field.assembly.parts() {
             let frame = part.body().frame();
             let (origin, axis) = (frame.origin(), frame.axis(2));
             let bounds = part.bounds();
-            let (from, to) = if axis[normal].abs() > 1.0 - 1e-9 {
-                let reach = (self.plane.value - bounds.min[normal])
-                    .min(bounds.max[normal] - self.plane.value);
-                if reach < -1e-9 * size {
+            let sides = bounds.sides();
+            let at = flat.map(|a| origin[a]);
+            let found = if axis[normal].abs() > 1.0 - 1e-9 {
+                let value = self.plane.value;
+                let room = 1e-9 * size;
+                if value < bounds.min[normal] - room || value > bounds.max[normal] + room {
                     continue;
                 }
-                let at = flat.map(|a| origin[a]);
-                (at, at)
+                CentreLine {
+                    at,
+                    along: [0.0; 2],
+                    span: [0.0; 2],
+                }
             } else if axis[normal].abs() < 1e-6
                 && (origin[normal] - self.plane.value).abs() < 1e-3 * size
             {
                 // As far along the axis as the part's box, and a little farther.
-                let middle = 0.5 * (bounds.min + bounds.max);
-                let half = 0.5
-                    * (0..3)
-                        .map(|a| axis[a].abs() * bounds.sides()[a])
-                        .sum::<f64>()
-                    + 0.035 * size;
-                let along = axis.dot(middle - origin);
-                let end = |t: f64| flat.map(|a| origin[a] + axis[a] * t);
-                (end(along - half), end(along + half))
+                let middle = axis.dot(0.5 * (bounds.min + bounds.max) - origin);
+                let half = 0.5 * axis.abs().dot(sides) + 0.03 * size;
+                CentreLine {
+                    at,
+                    along: flat.map(|a| axis[a]),
+                    span: [middle - half, middle + half],
+                }
             } else {
                 continue;
             };
-            let near = |a: [f64; 2], b: [f64; 2]| {
-                (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) < 1e-6 * size
-            };
-            if drawn.iter().any(|d| near(d.0, from) && near(d.1, to)) {
-                continue;
+            // Solids about one axis have one line.
+            match lines.iter_mut().find(|l| l.is_on(&found, 1e-6 * size)) {
+                Some(line) => line.join(&found),
+                None => lines.push(found),
             }
-            drawn.push((from, to));
-            if near(from, to) {
-                self.centre_mark(canvas, layout, from, pen);
+        }
+        for line in lines {
+            if line.span[0] < line.span[1] {
+                self.clipped(canvas, layout, line.span.map(|t| line.place(t)), pen);
             } else {
-                self.clipped(canvas, layout, [from, to], pen);
+                self.centre_mark(canvas, layout, line.at, pen);
             }
         }
     }
@@ -620,9 +626,11 @@ impl Drawing<'_> {
             // A label for every five sizes of the text.
             let step = round_step(shown * f64::from(if a == 0 { 5.5 } else { 4.0 } * size));
             let labels = Labels::new(from[a].abs().max(to[a].abs()), step);
+            let mut widest: f32 = 0.0;
             for value in multiples(from[a], to[a], step) {
                 let at = self.screen(layout, [[value, from[1]], [from[0], value]][a]);
                 let label = labels.text(value);
+                widest = widest.max(text::width(&label, small));
                 if a == 0 {
                     canvas.line([at[0], high[1]], [at[0], high[1] + 0.35 * size], pen);
                     let below = [at[0], high[1] + 0.6 * size + text::cap_height(small)];
@@ -640,7 +648,11 @@ impl Drawing<'_> {
             let (at, run) = if a == 0 {
                 ([middle[0], high[1] + 2.9 * size], Run::Right)
             } else {
-                ([1.25 * size, middle[1]], Run::Up)
+                let beside = low[0] - 1.25 * size - widest;
+                (
+                    [beside.max(text::cap_height(size) + 2.0), middle[1]],
+                    Run::Up,
+                )
             };
             text::draw(canvas, &name, size, at, (Align::Middle, run), ink());
         }
@@ -679,7 +691,7 @@ impl Drawing<'_> {
         let entries = annotate::materials(scene, self.field);
         let bottom = single(length(layout.size[1])) - 0.9 * size;
         let across = [low[0] - 3.0 * size, high[0] + 6.0 * size];
-        annotate::row(canvas, across, bottom, size, &entries);
+        annotate::rows(canvas, across, bottom, size, &entries);
     }
 
     /// The colours of the distances from `range[0]` to `range[1]`, with a scale.
@@ -706,8 +718,7 @@ impl Drawing<'_> {
             for v in multiples(range[0], range[1], self.step) {
                 let (y, main) = (place(v), v.abs() < 0.5 * self.step);
                 let width = if main { 2.5 * self.stroke } else { thin };
-                let colour = mix(ink(), [1.0; 3], if main { 0.0 } else { 0.25 });
-                canvas.line([left, y], [right, y], Pen::solid(width, colour));
+                canvas.line([left, y], [right, y], Pen::solid(width, ink()));
             }
         }
         let pen = Pen::solid(f32::max(1.3 * self.stroke, 1.0), ink());
@@ -735,6 +746,42 @@ impl Drawing<'_> {
         let middle = 0.5 * (low[1] + high[1]);
         let up = (Align::Middle, Run::Up);
         text::draw(canvas, &name, size, [x, middle], up, ink());
+    }
+}
+
+/// An axis in the plane, or the point where it pierces the plane.
+#[derive(Debug, Clone, Copy)]
+struct CentreLine {
+    at: [f64; 2],
+    /// A unit vector; zero for a point.
+    along: [f64; 2],
+    span: [f64; 2],
+}
+
+impl CentreLine {
+    fn place(&self, t: f64) -> [f64; 2] {
+        [0, 1].map(|a| self.at[a] + self.along[a] * t)
+    }
+
+    /// Whether the other is on the same straight line, or the same point.
+    fn is_on(&self, other: &Self, near: f64) -> bool {
+        let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];
+        let off = [0, 1].map(|a| other.at[a] - self.at[a]);
+        if self.along == [0.0; 2] || other.along == [0.0; 2] {
+            return self.along == other.along && off[0].hypot(off[1]) < near;
+        }
+        cross(self.along, other.along).abs() < 1e-9 && cross(self.along, off).abs() < near
+    }
+
+    /// Grows by the other's span.
+    fn join(&mut self, other: &Self) {
+        for t in other.span {
+            let end = other.place(t);
+            let t = (0..2)
+                .map(|a| (end[a] - self.at[a]) * self.along[a])
+                .sum::<f64>();
+            self.span = [self.span[0].min(t), self.span[1].max(t)];
+        }
     }
 }
 

@@ -24,7 +24,7 @@ const LIGHT: f64 = 0.11;
 /// Heights at which the ambient term looks at the distance, in sizes of the solid.
 const HEIGHTS: [f64; 6] = [0.006, 0.018, 0.045, 0.09, 0.17, 0.3];
 /// What each of them takes from the ambient light at most.
-const WEIGHTS: [f64; 6] = [0.13, 0.16, 0.17, 0.17, 0.15, 0.12];
+const WEIGHTS: [f64; 6] = [0.15, 0.17, 0.18, 0.18, 0.16, 0.14];
 
 /// The lights of a picture, and its floor.
 #[derive(Debug, Clone, Copy)]
@@ -83,9 +83,8 @@ impl Lights {
         let Some([_, leaves]) = field.span(ray.origin, ray.direction, 0.12 * size) else {
             return 1.0;
         };
-        let least = 0.006 * size;
         let mut share: f64 = 1.0;
-        let mut t = 0.004 * size;
+        let mut t = 0.006 * size;
         while t < leaves {
             let d = field.cut_distance(probe, ray.at(t));
             let cone = LIGHT * t;
@@ -95,7 +94,8 @@ impl Lights {
             }
             // Outside of the cone nothing changes until the two can meet.
             let free = (d - cone) / (1.0 + LIGHT);
-            t += free.max(0.35 * d.abs()).max(least);
+            // In it, steps are small against its width.
+            t += free.max(0.4 * d.abs()).max(0.6 * cone).max(0.003 * size);
         }
         let share = share.max(-1.0);
         0.25 * (1.0 + share).powi(2) * (2.0 - share)
@@ -113,16 +113,17 @@ impl Lights {
             {
                 d = d.min(p.z - floor);
             }
-            share -= weight * (1.0 - (d / s).clamp(0.0, 1.0));
+            // The square leaves no edge where a height begins to count.
+            share -= weight * (1.0 - (d / s).clamp(0.0, 1.0)).powi(2);
         }
         share
     }
 
     /// The colour of a surface.
     pub(super) fn surface(&self, albedo: Linear, normal: DVec3, lit: Lit) -> Linear {
-        const KEY: Linear = [1.32, 1.27, 1.20];
-        const SKY: Linear = [0.60, 0.64, 0.70];
-        const FLOOR: Linear = [0.40, 0.385, 0.37];
+        const KEY: Linear = [1.12, 1.09, 1.05];
+        const SKY: Linear = [0.52, 0.54, 0.57];
+        const FLOOR: Linear = [0.38, 0.37, 0.36];
         let cosine = |v: DVec3| single(normal.dot(v).max(0.0));
         let key = cosine(self.key) * lit.key;
         let up = single(0.5 + 0.5 * normal.z) * lit.ambient;
@@ -131,10 +132,13 @@ impl Lights {
         let half = (self.key + self.to_camera).normalize();
         let gloss = cosine(half);
         let gloss = lit.key * (0.16 * gloss.powi(60) + 0.035 * gloss.powi(12));
-        [0, 1, 2].map(|c| {
+        let seen = [0, 1, 2].map(|c| {
             let light = KEY[c] * key + SKY[c] * up + FLOOR[c] * down + head;
-            shoulder(albedo[c] * light + gloss)
-        })
+            albedo[c] * light + gloss
+        });
+        // By the brightest channel, so that hues stay.
+        let most = seen.into_iter().fold(1e-6, f32::max);
+        seen.map(|v| v * shoulder(most) / most)
     }
 
     /// The colour of the floor: the background, darker where light does not reach.
@@ -172,62 +176,34 @@ fn shoulder(v: f32) -> f32 {
     }
 }
 
-/// How a cut face is drawn.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Face {
-    pub(super) normal: DVec3,
-    /// Scene units for a pixel.
-    pub(super) pixel: f64,
-    /// Widths of lines relative to those of the default size.
-    pub(super) stroke: f64,
+/// The colour of a face that a cut opens: a tint with hatching, and a line where it ends.
+///
+/// * `at`: place in the picture, in pixels; hatching is equally wide and steep on every face.
+/// * `place`: that of the material; each has its own slope.
+/// * `border`: distance to the face's border, in pixels.
+/// * `stroke`: widths of lines relative to those of the default size.
+pub(super) fn face_colour(at: [f64; 2], place: usize, border: f64, stroke: f64) -> Linear {
+    let own = colour::material(place);
+    let tint = mix(own, [1.0; 3], 0.50);
+    let line = hatching([at[0], -at[1]], place, stroke);
+    let found = mix(tint, mix(own, [0.0; 3], 0.45), 0.8 * line);
+    let border = (1.4 * stroke + 0.5 - border).clamp(0.0, 1.0);
+    mix(found, colour::linear(colour::INK), single(border))
 }
 
-impl Face {
-    /// The colour of a face at a point: a tint with hatching, and a line where it ends.
-    ///
-    /// * `place`: that of the material; each has its own slope of the hatching.
-    /// * `depth`: distance to the surface.
-    /// * `screen`: the camera's axes, right, up and forward.
-    pub(super) fn colour(
-        &self,
-        point: DVec3,
-        place: usize,
-        depth: f64,
-        screen: [DVec3; 3],
-    ) -> Linear {
-        let own = colour::material(place);
-        let tint = mix(own, [1.0; 3], 0.52);
-        let ink = mix(own, [0.0; 3], 0.55);
-        let mut found = tint;
-        let (right, up, forward) = (screen[0], screen[1], screen[2]);
-        let n = self.normal;
-        let across = n.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
-        let slope = hatch_angle(place).to_radians();
-        let k = across * slope.sin() + n.cross(across) * slope.cos();
-        // How fast the hatching's coordinate changes from pixel to pixel.
-        let facing = n.dot(forward);
-        let along = |v: DVec3| k.dot(v - forward * (n.dot(v) / facing)) * self.pixel;
-        let speed = along(right).hypot(along(up));
-        let period = 9.0 * self.stroke * self.pixel;
-        let phase = k.dot(point) / period;
-        let off = (phase - phase.round()).abs() * period / speed;
-        // Seen edge on, lines that would merge give way to their mean.
-        let width = 1.1 * self.stroke;
-        let line = (0.5 * width + 0.5 - off).clamp(0.0, 1.0);
-        let mean = (width * speed / period).min(1.0);
-        let resolved = ((period / speed - 2.0) / 2.0).clamp(0.0, 1.0);
-        found = mix(
-            found,
-            ink,
-            single(0.75 * (resolved * line + (1.0 - resolved) * mean)),
-        );
-        let border = (1.5 * self.stroke + 0.5 - depth / self.pixel).clamp(0.0, 1.0);
-        mix(found, colour::linear(colour::INK), single(border))
-    }
+/// How much of a pixel a line of a material's hatching covers.
+///
+/// * `at`: place in pixels, y up.
+pub(super) fn hatching(at: [f64; 2], place: usize, stroke: f64) -> f32 {
+    let (sin, cos) = hatch_angle(place).to_radians().sin_cos();
+    let period = 8.5 * stroke;
+    let phase = (at[1] * cos - at[0] * sin) / period;
+    let off = (phase - phase.round()).abs() * period;
+    single((0.55 * stroke + 0.5 - off).clamp(0.0, 1.0))
 }
 
 /// The slope of the hatching of a material, in degrees.
-pub(super) fn hatch_angle(place: usize) -> f64 {
+fn hatch_angle(place: usize) -> f64 {
     const ANGLES: [f64; 7] = [45.0, 135.0, 20.0, 160.0, 70.0, 110.0, 90.0];
     ANGLES[place % ANGLES.len()]
 }

@@ -96,10 +96,22 @@ fn march(
     while t <= to {
         let d = field.distance(probe, ray.at(t));
         if d <= 0.0 {
-            return Ok(bisect(field, ray, outside, t));
+            return Ok(bisect(field, ray, outside, t, pixel));
         }
         nearest = nearest.min(d);
         outside = t;
+        // Nearer than a pixel, membership is cheaper than more steps.
+        if d < pixel {
+            let ahead = [1.25, 2.0, 4.0].map(|n| t + n * d);
+            let inside = |t: &f64| *t <= to && field.assembly.contains(ray.at(*t));
+            if let Some(inside) = ahead.into_iter().find(inside) {
+                return Ok(bisect(field, ray, outside, inside, pixel));
+            }
+            // None of it was inside, and what is thinner than this is not seen.
+            if d < 0.1 * pixel {
+                t += d;
+            }
+        }
         // Along a face a hair above it every step is the smallest; let them grow.
         if d < least {
             least *= 1.02;
@@ -110,8 +122,8 @@ fn march(
 }
 
 /// The border between a point outside and one inside, from outside.
-fn bisect(field: &Field<'_>, ray: Ray, mut outside: f64, mut inside: f64) -> f64 {
-    let enough = 1e-9 * field.size;
+fn bisect(field: &Field<'_>, ray: Ray, mut outside: f64, mut inside: f64, pixel: f64) -> f64 {
+    let enough = 0.003 * pixel;
     while inside - outside > enough {
         let middle = 0.5 * (outside + inside);
         if !(outside < middle && middle < inside) {
