@@ -8,8 +8,8 @@
 //! distance's radius is free of the solid, and how it compares to the cone of the light, or to the
 //! height above the surface, says how much of the light comes through.
 //!
-//! * Sources: I. Quilez, *Soft shadows in raymarched SDFs* (2010) with S. Aaltonen's remark on the
-//!   inner half of the penumbra (2018); A. Evans, *Fast approximations for global illumination on
+//! * Sources: I. Quilez, *Soft shadows in raymarched SDFs* (2010) with S. Aaltonen's estimate
+//!   between two steps (2018); A. Evans, *Fast approximations for global illumination on
 //!   dynamic scenes*, SIGGRAPH 2006 course, for the ambient term.
 
 use super::camera::View;
@@ -20,7 +20,9 @@ use super::trace::Ray;
 use glam::DVec3;
 
 /// The tangent of half the angle that the key light fills: large, for soft shadows.
-const LIGHT: f64 = 0.11;
+const LIGHT: f64 = 0.15;
+/// The share of the key light that counts as none.
+const HIDDEN: f64 = 0.1;
 /// Heights at which the ambient term looks at the distance, in sizes of the solid.
 const HEIGHTS: [f64; 6] = [0.006, 0.018, 0.045, 0.09, 0.17, 0.3];
 /// What each of them takes from the ambient light at most.
@@ -85,20 +87,31 @@ impl Lights {
         };
         let mut share: f64 = 1.0;
         let mut t = 0.006 * size;
+        let mut last: Option<(f64, f64)> = None;
         while t < leaves {
             let d = field.cut_distance(probe, ray.at(t));
             let cone = LIGHT * t;
             share = share.min(d / cone);
-            if share < -1.0 {
+            if let Some((t0, d0)) = last {
+                // Two balls tell how near a small thing between their middles may be to the ray.
+                let step = t - t0;
+                let u = (d0 * d0 - d * d + step * step) / (2.0 * step);
+                if u > 0.0 && u < step {
+                    let nearest = (d0 * d0 - u * u).max(0.0).sqrt();
+                    share = share.min(nearest / (LIGHT * (t0 + u)));
+                }
+            }
+            if share < HIDDEN {
                 return 0.0;
             }
-            // Outside of the cone nothing changes until the two can meet.
+            last = Some((t, d));
+            // Outside of the cone nothing changes until the two can meet. In it, what a step jumps
+            // over is nearer than half of it: that hides the light.
             let free = (d - cone) / (1.0 + LIGHT);
-            // In it, steps are small against its width.
-            t += free.max(0.4 * d.abs()).max(0.6 * cone).max(0.003 * size);
+            t += free.max(0.8 * d).max(2.0 * HIDDEN * cone).max(0.002 * size);
         }
-        let share = share.max(-1.0);
-        0.25 * (1.0 + share).powi(2) * (2.0 - share)
+        let share = (share - HIDDEN) / (1.0 - HIDDEN);
+        share * share * (3.0 - 2.0 * share)
     }
 
     /// The share of the light from all around that the solid and the floor let through.
@@ -111,7 +124,8 @@ impl Lights {
             if let Some(floor) = self.floor
                 && normal.z < 0.99
             {
-                d = d.min(p.z - floor);
+                // The floor is light itself, so it takes less.
+                d = d.min(0.45 * s + (p.z - floor).max(0.0));
             }
             // The square leaves no edge where a height begins to count.
             share -= weight * (1.0 - (d / s).clamp(0.0, 1.0)).powi(2);

@@ -1,8 +1,8 @@
-//! Where rays meet the solid: sphere tracing, finished by bisection on exact membership.
+//! Where rays meet the solid: sphere tracing, finished in a bracket of exact membership.
 //!
 //! ```text
 //!   camera --> (    d0    )(  d1  )( d2 )(d3)|#####    a step is the distance to the surface
-//!                                          a b         a outside, b inside: bisect
+//!                                          a b         a outside, b inside
 //! ```
 //!
 //! A step that is a lower bound of the distance is as safe, only shorter. Steps never fall below a
@@ -38,8 +38,9 @@ pub(super) enum Meets {
     Nothing(f64),
 }
 
-/// The smallest step, in pixels: a hundredth of what is seen.
-const LEAST_STEP: f64 = 0.02;
+/// The smallest step, in pixels. Chords shorter than it may be jumped over: on a silhouette of a hundred
+/// pixels' radius that is less than 2e-5 pixels, while rays that graze need ten times fewer steps.
+const LEAST_STEP: f64 = 0.12;
 
 /// Follows a ray from `from` on.
 ///
@@ -92,26 +93,27 @@ fn march(
 ) -> Result<f64, f64> {
     let mut least = LEAST_STEP * pixel;
     let mut nearest = f64::INFINITY;
-    let (mut outside, mut t) = (from, from);
+    let (mut t, mut last) = (from, None);
     while t <= to {
         let d = field.distance(probe, ray.at(t));
         if d <= 0.0 {
-            return Ok(bisect(field, ray, outside, t, pixel));
+            let outside = last.unwrap_or((t, 0.0));
+            return Ok(bracketed(field, probe, ray, [outside, (t, d)], pixel));
         }
         nearest = nearest.min(d);
-        outside = t;
-        // Nearer than a pixel, membership is cheaper than more steps.
-        if d < pixel {
-            let ahead = [1.25, 2.0, 4.0].map(|n| t + n * d);
-            let inside = |t: &f64| *t <= to && field.assembly.contains(ray.at(*t));
-            if let Some(inside) = ahead.into_iter().find(inside) {
-                return Ok(bisect(field, ray, outside, inside, pixel));
-            }
-            // None of it was inside, and what is thinner than this is not seen.
-            if d < 0.1 * pixel {
-                t += d;
+        // Nearer than a pixel, a guess from how fast the surface has come saves many steps.
+        if d < pixel
+            && let Some((t0, d0)) = last
+        {
+            let speed = ((d0 - d) / (t - t0)).clamp(0.2, 1.0);
+            let ahead = t + 1.02 * d / speed + 0.25 * least;
+            let guess = field.distance(probe, ray.at(ahead));
+            if guess <= 0.0 && ahead <= to {
+                let ends = [(t, d), (ahead, guess)];
+                return Ok(bracketed(field, probe, ray, ends, pixel));
             }
         }
+        last = Some((t, d));
         // Along a face a hair above it every step is the smallest; let them grow.
         if d < least {
             least *= 1.02;
@@ -121,25 +123,52 @@ fn march(
     Err(nearest)
 }
 
-/// The border between a point outside and one inside, from outside.
-fn bisect(field: &Field<'_>, ray: Ray, mut outside: f64, mut inside: f64, pixel: f64) -> f64 {
+/// The first point inside, to a small part of a pixel, between a point outside and one inside.
+///
+/// The signed distance has the sign of the exact membership, so the bracket always holds the
+/// surface; its size tells where in the bracket to look next.
+fn bracketed(
+    field: &Field<'_>,
+    probe: &mut Probe,
+    ray: Ray,
+    [(mut outside, mut above), (mut inside, mut below)]: [(f64, f64); 2],
+    pixel: f64,
+) -> f64 {
     let enough = 0.003 * pixel;
-    while inside - outside > enough {
-        let middle = 0.5 * (outside + inside);
-        if !(outside < middle && middle < inside) {
+    for round in 0..60 {
+        if inside - outside <= enough || below.abs() <= 0.1 * enough {
             break;
         }
-        if field.assembly.contains(ray.at(middle)) {
-            inside = middle;
+        // Every third time the middle, so that the bracket shrinks whatever the surface does.
+        let share = if round % 3 == 2 {
+            0.5
         } else {
-            outside = middle;
+            (above / (above - below)).clamp(0.02, 0.98)
+        };
+        let t = outside + (inside - outside) * share;
+        if !(outside < t && t < inside) {
+            break;
+        }
+        let d = field.distance(probe, ray.at(t));
+        if d <= 0.0 {
+            (inside, below) = (t, d);
+        } else {
+            (outside, above) = (t, d);
+            if above <= 0.1 * enough {
+                // The surface is here, and the other end may be far.
+                let next = outside + enough.min(inside - outside);
+                if field.distance(probe, ray.at(next)) <= 0.0 {
+                    inside = next;
+                    break;
+                }
+            }
         }
     }
     inside
 }
 
-/// How far all rays parallel to this one, within `radius` of it, can go without meeting the solid
-/// as it is without a cut; `None` where they meet none of it.
+/// How far all rays parallel to this one, within `radius` of it, can go without meeting the solid;
+/// `None` where they meet none of it.
 pub(super) fn clear(
     field: &Field<'_>,
     probe: &mut Probe,
@@ -150,7 +179,7 @@ pub(super) fn clear(
     let [enters, leaves] = field.span(ray.origin, ray.direction, radius)?;
     let mut t = enters.max(from);
     while t <= leaves {
-        let room = field.distance(probe, ray.at(t)) - radius;
+        let room = field.cut_distance(probe, ray.at(t)) - radius;
         if room <= 0.25 * radius {
             return Some(t);
         }
