@@ -41,8 +41,8 @@ struct Seconds {
     prepare: f64,
     sample: f64,
     write: f64,
-    /// `None` where no preview was asked for.
-    preview: Option<f64>,
+    /// 0 where no preview was asked for.
+    preview: f64,
     total: f64,
 }
 
@@ -83,7 +83,7 @@ pub(super) fn run(
     if arguments.preview {
         preview(&scene, &plan, &writer)?;
     }
-    let preview = arguments.preview.then(|| drawn.elapsed().as_secs_f64());
+    let preview = drawn.elapsed().as_secs_f64();
     let manifest = writer.finish(summary(&scene, &plan, &tally))?;
     if is_empty(&scene) {
         console.warn(NOTHING_LEFT);
@@ -571,7 +571,7 @@ fn dry_run(
         prepare,
         sample: 0.0,
         write: 0.0,
-        preview: None,
+        preview: 0.0,
         total: prepare,
     };
     let [nx, ny, nz] = plan.grid.dims();
