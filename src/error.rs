@@ -3,6 +3,7 @@
 use crate::grid::GridError;
 use crate::io::IoError;
 use crate::mesh::MeshError;
+use crate::picture::PictureError;
 use crate::scene::SceneError;
 
 /// What can go wrong.
@@ -21,6 +22,9 @@ pub enum Error {
     /// A solid cannot be tessellated.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// A picture cannot be made.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// Something needs more memory or disk than there is.
     #[error("{what} needs {needed} bytes, and {available} are available; {remedy}")]
     TooLarge {

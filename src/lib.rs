@@ -17,7 +17,7 @@
 //!   scene ──> region ──> solid ──> sample ──> io          cli drives them all
 //!               │          │         │
 //!             nurbs        │        grid
-//!               └── math ──┘
+//!               └── math ──┘              picture draws scenes
 //! ```
 //!
 //! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
@@ -32,6 +32,7 @@
 //! * [`sample`]: layers of occupancy, fraction, distance and material.
 //! * [`validate`]: the exact answers held against the triangles, the field against what a distance is.
 //! * [`converge`]: how the samples approach the solid as voxels become smaller.
+//! * [`picture`]: shaded views, sections and contact sheets, from the exact distance.
 //! * [`io`]: the EXR stack with its manifest, tables of points, files of triangles; it knows no geometry.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
 //!
@@ -53,6 +54,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod nurbs;
+pub mod picture;
 pub mod region;
 pub mod sample;
 pub mod scene;

@@ -82,6 +82,8 @@ pub(super) enum Command {
     Converge(Converge),
     /// Write the tessellated boundary: .stl, .obj or .ply
     Mesh(Mesh),
+    /// Draw the solid, shaded or as a section with distance isolines
+    Render(Render),
     /// Show what a finished stack holds, and verify its digests
     Info(Info),
     /// Write a manual page, shell completions or the schema of scene files to standard output
@@ -124,6 +126,9 @@ pub(super) struct Voxelize {
     /// Say what would be written, and write nothing
     #[arg(long)]
     pub(super) dry_run: bool,
+    /// Draw preview.png, the solid, and preview-slices.png, nine of the slices, beside the stack
+    #[arg(long)]
+    pub(super) preview: bool,
 }
 
 /// Flags in place of the scene's resolution, spacing, origin and dims; its bounds stay.
@@ -279,6 +284,73 @@ pub(super) struct Mesh {
     /// Write each solid's own mesh
     #[arg(long)]
     pub(super) parts: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Both kinds are drawn from the exact distance, not from voxels or a mesh. The shaded picture is orthographic with +z up,
+so its scale bar holds everywhere; a section is to scale.
+
+Examples: voxlathe render scenes/goblet.toml -o goblet.png --cut quarter
+          voxlathe render scenes/goblet.toml -o section.png --slice y=0")]
+pub(super) struct Render {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// File to write, .png
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Pixels along x, 1 to 16384; 1200 for a shaded picture, by the solid's shape for a section
+    #[arg(long, value_name = "PIXELS")]
+    pub(super) width: Option<usize>,
+    /// Pixels along y, 1 to 16384; 900 for a shaded picture, by the solid's shape for a section
+    #[arg(long, value_name = "PIXELS")]
+    pub(super) height: Option<usize>,
+    /// Where it is seen from, in degrees: azimuth from +x towards +y, elevation; -55,24 without it
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_negative_numbers = true,
+        allow_hyphen_values = true,
+        conflicts_with = "slice"
+    )]
+    pub(super) view: Vec<f64>,
+    /// Cut away what is nearest to the camera, through the axis, to show the inside
+    #[arg(long, value_name = "PART", value_enum, conflicts_with = "slice")]
+    pub(super) cut: Option<CutKind>,
+    /// Draw the section by a plane instead: x, y or z and its value in scene units, as z=0.5
+    #[arg(long, value_name = "AXIS=VALUE")]
+    pub(super) slice: Option<String>,
+    /// Distance between isolines in scene units; a round one without it
+    #[arg(
+        long,
+        value_name = "STEP",
+        allow_negative_numbers = true,
+        requires = "slice"
+    )]
+    pub(super) isolines: Option<f64>,
+    /// Leave out scale bar, axes, names and colour bar
+    #[arg(long)]
+    pub(super) plain: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum CutKind {
+    /// A quarter of the turn
+    Quarter,
+    /// The half in front
+    Half,
+}
+
+impl CutKind {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Quarter => "quarter",
+            Self::Half => "half",
+        }
+    }
 }
 
 #[derive(Debug, Args)]

@@ -12,6 +12,7 @@ mod measure;
 mod mesh;
 mod output;
 mod query;
+mod render;
 mod step;
 mod validate;
 mod voxelize;
@@ -66,6 +67,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Validate(a) => validate::run(a, common, console),
         Command::Converge(a) => converge::run(a, common, console),
         Command::Mesh(a) => mesh::run(a, common, console),
+        Command::Render(a) => render::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }

@@ -12,6 +12,7 @@ use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
 };
+use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{Certainty, Channel, LayerBuffers, LayerSampler, Selection, Tally};
 use crate::scene::{ChannelName, CompressionName, FormatName, Scene, nearest};
 use crate::solid::{Operation, Part};
@@ -40,6 +41,8 @@ struct Seconds {
     prepare: f64,
     sample: f64,
     write: f64,
+    /// 0 where no preview was asked for.
+    preview: f64,
     total: f64,
 }
 
@@ -76,6 +79,11 @@ pub(super) fn run(
         options,
     )?;
     let (sample, write, tally) = stream(&scene, &plan, &writer, console)?;
+    let drawn = Instant::now();
+    if arguments.preview {
+        preview(&scene, &plan, &writer)?;
+    }
+    let preview = drawn.elapsed().as_secs_f64();
     let manifest = writer.finish(summary(&scene, &plan, &tally))?;
     if is_empty(&scene) {
         console.warn(NOTHING_LEFT);
@@ -84,6 +92,7 @@ pub(super) fn run(
         prepare,
         sample,
         write,
+        preview,
         total: start.elapsed().as_secs_f64(),
     };
     console.result(
@@ -385,6 +394,28 @@ fn stream(
     Ok((sample, write, tally))
 }
 
+/// Draws the preview's two pictures beside the slices; the manifest lists them.
+fn preview(scene: &Scene, plan: &Plan, writer: &StackWriter) -> Result<(), Failure> {
+    let interrupted = || interrupt::check().is_err();
+    let options = RenderOptions {
+        width: 960,
+        height: 720,
+        ..RenderOptions::default()
+    };
+    let pictures = [
+        ("preview.png", render(scene, &options, &interrupted)?),
+        (
+            "preview-slices.png",
+            contact_sheet(scene, &plan.grid, &interrupted)?,
+        ),
+    ];
+    for (name, picture) in pictures {
+        let bytes = picture.to_png().map_err(Error::from)?;
+        writer.write_other(name, &bytes)?;
+    }
+    Ok(())
+}
+
 /// Whether the composite has no volume at all.
 fn is_empty(scene: &Scene) -> bool {
     scene.exact_volume() == Some(0.0)
@@ -503,7 +534,7 @@ fn document(
         "volume_occupancy": manifest.and_then(|m| m.volume_occupancy),
         "volume_fraction": manifest.and_then(|m| m.volume_fraction),
         "volume_exact": scene.exact_volume(),
-        "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "total": s.total })),
+        "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": peak_memory(),
         "warnings": warnings(scene),
     })
@@ -520,6 +551,7 @@ fn dry_run(
         prepare,
         sample: 0.0,
         write: 0.0,
+        preview: 0.0,
         total: prepare,
     };
     let [nx, ny, nz] = plan.grid.dims();
