@@ -6,6 +6,7 @@ use super::interrupt;
 use super::output::Console;
 use crate::converge::{Plan, Row, Study, study};
 use crate::io::{IoError, write_file_atomically};
+use crate::picture::{Panel, Picture, Series, log_plot};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -13,6 +14,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 const TABLE: &str = "converge.csv";
+const PLOT: &str = "converge.png";
 
 pub(super) fn run(
     arguments: &Converge,
@@ -41,6 +43,10 @@ pub(super) fn run(
             source,
         })?;
         write_file_atomically(&path, |file| file.write_all(csv(&found).as_bytes()))?;
+        files.push(path);
+        let path = directory.join(PLOT);
+        let png = plot(&found, scene.name(), scene.model().units.name()).to_png()?;
+        write_file_atomically(&path, |file| file.write_all(&png))?;
         files.push(path);
     }
     let document = json!({
@@ -71,7 +77,7 @@ fn check_free(directory: &Path, force: bool) -> Result<(), Failure> {
     if held.next().is_some() && !force {
         let shown = directory.display();
         return Err(Failure::usage(format!(
-            "{shown} is not empty; choose another directory, or add --force to replace {TABLE} in it"
+            "{shown} is not empty; choose another directory, or add --force to replace {TABLE} and {PLOT} in it"
         )));
     }
     Ok(())
@@ -126,6 +132,42 @@ fn csv(study: &Study) -> String {
         text.push('\n');
     }
     text
+}
+
+/// Errors of the volumes, and of the distances, over the spacing.
+fn plot(study: &Study, scene: &str, units: &str) -> Picture {
+    let series = |name: &'static str, value: fn(&Row) -> f64| Series {
+        name,
+        points: study.rows.iter().map(|r| [r.spacing, value(r)]).collect(),
+    };
+    let x = format!("spacing / {units}");
+    let distances = format!("error of the stored distance / {units}");
+    log_plot(&[
+        Panel {
+            title: &format!("{scene}: volume"),
+            x: &x,
+            y: "relative error of the volume",
+            series: vec![
+                series("occupancy", |r| r.volume_occupancy_error),
+                series("occupancy, mean over moved grids", |r| {
+                    r.volume_occupancy_mean_error
+                }),
+                series("fraction", |r| r.volume_fraction_error),
+                series("fraction, its bound", |r| r.volume_fraction_bound),
+            ],
+            slopes: &[1, 2],
+        },
+        Panel {
+            title: &format!("{scene}: signed distance"),
+            x: &x,
+            y: &distances,
+            series: vec![
+                series("largest", |r| r.sdf_max_error),
+                series("mean", |r| r.sdf_mean_error),
+            ],
+            slopes: &[1],
+        },
+    ])
 }
 
 fn table(study: &Study, units: &str) -> String {
