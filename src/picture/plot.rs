@@ -29,7 +29,7 @@ pub struct Panel<'a> {
 }
 
 /// Width and height of one panel, in pixels.
-const PANEL: [f32; 2] = [900.0, 720.0];
+const PANEL: [f32; 2] = [900.0, 810.0];
 /// Size of the text, in pixels.
 const SIZE: f32 = 19.0;
 /// Where the axes are in a panel: left, right, top, bottom.
@@ -162,13 +162,7 @@ impl Axes {
             // As far down as the axes go.
             let end = self.x[0].max(x0 - (y0 - self.y[0]) / p);
             let (from, to) = (self.at([x0, y0]), self.at([end, y0 + p * (end - x0)]));
-            let dashes: &[f32] = if n == 0 { &[9.0, 6.0] } else { &[2.5, 5.0] };
-            let pen = Pen {
-                half_width: 0.9,
-                colour: mix([1.0; 3], ink(), 0.55),
-                dashes,
-            };
-            canvas.line(from, to, pen);
+            canvas.line(from, to, reference(n));
         }
     }
 
@@ -188,45 +182,27 @@ impl Axes {
         }
     }
 
-    /// The names at the lower right, the reference lines last.
+    /// The names below the axes, the reference lines last.
     fn legend(&self, canvas: &mut Canvas, panel: &Panel) {
         let slopes: Vec<String> = panel.slopes.iter().map(|s| format!("order {s}")).collect();
         let names = panel.series.iter().map(|s| s.name);
-        let names: Vec<&str> = names.chain(slopes.iter().map(String::as_str)).collect();
-        let longest = names
-            .iter()
-            .map(|n| text::width(n, 0.95 * SIZE))
-            .fold(0.0, f32::max);
-        let [_, right, _, bottom] = FRAME;
-        let step = 1.5 * SIZE;
-        let height = step * single(super::canvas::length(names.len())) + 0.7 * SIZE;
-        let low = [
-            self.left + right - longest - 4.2 * SIZE,
-            bottom - height - 0.5 * SIZE,
-        ];
-        let high = [self.left + right - 0.6 * SIZE, bottom - 0.5 * SIZE];
-        canvas.rectangle(low, high, [1.0; 3]);
-        canvas.frame(low, high, Pen::solid(1.0, mix([1.0; 3], ink(), 0.35)));
-        for (n, name) in names.iter().enumerate() {
-            let y = low[1] + step * (single(super::canvas::length(n)) + 0.85);
-            let (a, b) = ([low[0] + 0.5 * SIZE, y], [low[0] + 2.5 * SIZE, y]);
+        let names = names.chain(slopes.iter().map(String::as_str));
+        let [left, right, _, bottom] = FRAME;
+        let start = [self.left + left, bottom + 5.6 * SIZE];
+        let [mut x, mut y] = start;
+        for (n, name) in names.enumerate() {
+            let wide = 2.6 * SIZE + text::width(name, 0.95 * SIZE);
+            if x > start[0] && x + wide > self.left + right {
+                (x, y) = (start[0], y + 1.6 * SIZE);
+            }
+            let (a, b) = ([x, y], [x + 2.0 * SIZE, y]);
             if n < panel.series.len() {
                 canvas.line(a, b, Pen::solid(2.4, colour::material(n)));
-                marker(canvas, [0.5 * (a[0] + b[0]), y], colour::material(n));
+                marker(canvas, [x + SIZE, y], colour::material(n));
             } else {
-                let dashes: &[f32] = if n == panel.series.len() {
-                    &[9.0, 6.0]
-                } else {
-                    &[2.5, 5.0]
-                };
-                let pen = Pen {
-                    half_width: 0.9,
-                    colour: mix([1.0; 3], ink(), 0.55),
-                    dashes,
-                };
-                canvas.line(a, b, pen);
+                canvas.line(a, b, reference(n - panel.series.len()));
             }
-            let at = [low[0] + 3.0 * SIZE, y + 0.34 * SIZE];
+            let at = [x + 2.4 * SIZE, y + 0.34 * SIZE];
             text::draw(
                 canvas,
                 name,
@@ -235,7 +211,17 @@ impl Axes {
                 (Align::Start, Run::Right),
                 ink(),
             );
+            x += wide + 1.4 * SIZE;
         }
+    }
+}
+
+/// How the reference line number `n` is drawn.
+fn reference(n: usize) -> Pen<'static> {
+    Pen {
+        half_width: 0.9,
+        colour: mix([1.0; 3], ink(), 0.55),
+        dashes: if n == 0 { &[9.0, 6.0] } else { &[2.5, 5.0] },
     }
 }
 
