@@ -6,7 +6,6 @@ use super::interrupt;
 use super::output::Console;
 use crate::converge::{Plan, Row, Study, study};
 use crate::io::{IoError, write_file_atomically};
-use crate::picture::{Panel, Picture, Series, log_plot};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -45,7 +44,9 @@ pub(super) fn run(
         write_file_atomically(&path, |file| file.write_all(csv(&found).as_bytes()))?;
         files.push(path);
         let path = directory.join(PLOT);
-        let png = plot(&found, scene.name(), scene.model().units.name()).to_png()?;
+        let png = found
+            .plot(scene.name(), scene.model().units.name())
+            .to_png()?;
         write_file_atomically(&path, |file| file.write_all(&png))?;
         files.push(path);
     }
@@ -132,42 +133,6 @@ fn csv(study: &Study) -> String {
         text.push('\n');
     }
     text
-}
-
-/// Errors of the volumes, and of the distances, over the spacing.
-fn plot(study: &Study, scene: &str, units: &str) -> Picture {
-    let series = |name: &'static str, value: fn(&Row) -> f64| Series {
-        name,
-        points: study.rows.iter().map(|r| [r.spacing, value(r)]).collect(),
-    };
-    let x = format!("spacing / {units}");
-    let distances = format!("error of the stored distance / {units}");
-    log_plot(&[
-        Panel {
-            title: &format!("{scene}: volume"),
-            x: &x,
-            y: "relative error of the volume",
-            series: vec![
-                series("occupancy", |r| r.volume_occupancy_error),
-                series("occupancy, mean over moved grids", |r| {
-                    r.volume_occupancy_mean_error
-                }),
-                series("fraction", |r| r.volume_fraction_error),
-                series("fraction, its bound", |r| r.volume_fraction_bound),
-            ],
-            slopes: &[1, 2],
-        },
-        Panel {
-            title: &format!("{scene}: signed distance"),
-            x: &x,
-            y: &distances,
-            series: vec![
-                series("largest", |r| r.sdf_max_error),
-                series("mean", |r| r.sdf_mean_error),
-            ],
-            slopes: &[1],
-        },
-    ])
 }
 
 fn table(study: &Study, units: &str) -> String {

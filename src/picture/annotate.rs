@@ -171,11 +171,11 @@ fn legend_text(size: f32) -> f32 {
 }
 
 /// Entries in lines that are not longer than there is room.
-fn wrapped<'a>(
+fn wrapped(
     [from, to]: [f32; 2],
     size: f32,
-    entries: &'a [(String, Linear)],
-) -> Vec<&'a [(String, Linear)]> {
+    entries: &[(String, Linear)],
+) -> Vec<&[(String, Linear)]> {
     let small = legend_text(size);
     let mut lines = Vec::new();
     let (mut start, mut total) = (0, 0.0);

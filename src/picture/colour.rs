@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn nothing_of_the_diverging_map_is_clipped() {
-        for i in -128..=128 {
+        for i in -128_i16..=128 {
             let c = diverging(f32::from(i) / 128.0);
             assert!(c.iter().all(|&v| v > 0.0 && v < 1.0), "{i}: {c:?}");
         }

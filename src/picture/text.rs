@@ -142,7 +142,7 @@ mod tests {
         assert!(blank.iter().all(|&b| b == 255));
         for c in ALL.chars() {
             let picture = drawn(&c.to_string(), Run::Right);
-            let dark = picture.iter().filter(|&&b| b < 128).count();
+            let dark = picture.iter().filter(|&&b| b < 215).count();
             assert!(dark >= 3, "{c:?} is not seen");
             if let Some(other) = seen.insert(picture, c) {
                 panic!("{c:?} looks like {other:?}");

@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Disagreements that are kept to be shown.
 const SHOWN: usize = 20;
 /// How far a winding number may be off: it is a whole number, and rounded to one.
-const ACCURACY: f64 = 0.25;
+const ACCURACY: f64 = 0.45;
 
 /// One solid's answers about a point.
 #[derive(Debug, Clone, PartialEq)]
