@@ -162,7 +162,10 @@ fn make_the_gallery() {
     }
     table += "\n";
     let readme = fs::read_to_string(README).expect("the README");
-    fs::write(README, readme.replace(gallery(&readme), &table)).expect("the README");
+    let from = readme.find(BEGIN).expect("the gallery begins") + BEGIN.len();
+    let rest = &readme[from + gallery(&readme).len()..];
+    let whole = format!("{}{table}{rest}", &readme[..from]);
+    fs::write(README, whole).expect("the README");
     // What stands elsewhere in the README.
     let load = |name: &str| Scene::load(format!("scenes/{name}.toml")).expect("a shipped scene");
     let cut = RenderOptions {

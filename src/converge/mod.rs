@@ -222,7 +222,8 @@ fn layers(
     over_layers(scene, grid, selection, stop, |k, buffers| {
         let mut sums = Sums {
             inside: buffers.inside,
-            fraction: buffers.fraction_sum,
+            // As stored, in f32.
+            fraction: buffers.fraction.iter().map(|&f| f64::from(f)).sum(),
             ..Sums::default()
         };
         let partial = |f: &&f32| **f > 0.0 && **f < 1.0;

@@ -11,7 +11,7 @@
 //! it. Its answers come from the triangles alone, so they check the exact ones.
 //!
 //! * Units: lengths in scene units.
-//! * Accuracy: see [`tessellate`] for the mesh, [`MeshTree`] for the questions.
+//! * Accuracy: see [`tessellate()`] for the mesh, [`MeshTree`] for the questions.
 
 mod bvh;
 mod cap;
