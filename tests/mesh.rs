@@ -80,6 +80,27 @@ fn every_shipped_solid_is_closed_and_its_volume_is_within_the_chord_error_of_the
     }
 }
 
+/// Gaps that a profile closes by a segment of 1e-15 make no triangles: programs that weld by
+/// distance would tear the mesh there.
+#[test]
+fn no_edge_is_a_rounding() {
+    for (name, scene) in shipped() {
+        for part in scene.assembly().parts() {
+            let size = part.bounds().longest_side();
+            let mesh = tessellate(part.body(), 2e-3 * size).expect("a mesh");
+            let shortest = mesh
+                .corners()
+                .flat_map(|[a, b, c]| [a.distance(b), b.distance(c), c.distance(a)])
+                .fold(f64::INFINITY, f64::min);
+            assert!(
+                shortest > 1e-7 * size,
+                "{name} {}: {shortest:e}",
+                part.name()
+            );
+        }
+    }
+}
+
 #[test]
 fn hard_profiles_close() {
     for (name, text) in hard::texts(true) {

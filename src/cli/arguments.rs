@@ -218,7 +218,7 @@ pub(super) struct Validate {
     #[command(flatten)]
     pub(super) step: Step,
     /// Look at this many random points of the grid's box instead of every voxel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     pub(super) samples: Option<u64>,
     /// Largest distance between triangles and true surface, in scene units; a tenth of the smallest
     /// grid spacing without it

@@ -64,11 +64,15 @@ pub(super) fn run(
     }
     let document = document(&report, &scene, &grid);
     console.result(&document, &text(&report, scene.model().units.name()))?;
-    if report.is_ok() {
-        return Ok(ExitCode::SUCCESS);
+    if !report.is_ok() {
+        console.say("error: there are differences that nothing explains; see the report");
     }
-    console.say("error: there are differences that nothing explains; see the report");
-    Ok(ExitCode::from(1))
+    Ok(ExitCode::from(verdict(&report)))
+}
+
+/// The exit code: 1 where anything is not as it must be.
+fn verdict(report: &Report) -> u8 {
+    u8::from(!report.is_ok())
 }
 
 fn document(report: &Report, scene: &Scene, grid: &GridSpec) -> Value {
@@ -214,4 +218,76 @@ fn text(report: &Report, units: &str) -> String {
     }
     line("ok", report.is_ok().to_string());
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::validate::PartMesh;
+    use glam::DVec3;
+
+    /// The triangles of one scene against the exact answers of another.
+    fn report(place: &str) -> (Report, Scene, GridSpec) {
+        let scene = |place: &str| {
+            let text = format!(
+                "schema = 1
+                 grid = {{ resolution = 12 }}
+                 profiles.ring.curves = [{{ kind = 'circle', center = [3, 0], radius = 1 }}]
+                 solid = [{{ kind = 'revolve', profile = 'ring', name = 'the ring', place = {place} }}]"
+            );
+            Scene::parse(&text).expect("a scene")
+        };
+        let (own, other) = (scene("[]"), scene(place));
+        let grid = own.grid().expect("a grid");
+        let meshes = meshes(&other, 0.05).expect("a mesh");
+        let found = validate(&own, &grid, &meshes, Points::Grid, &|| Ok(()), &|_| {});
+        (found.expect("nothing stops it"), own, grid)
+    }
+
+    #[test]
+    fn what_is_broken_ends_with_1_and_is_printed() {
+        let (good, _, _) = report("[]");
+        assert_eq!(verdict(&good), 0);
+        let (bad, scene, grid) = report("[{ translate = [0, 0, 0.5] }]");
+        assert_eq!(verdict(&bad), 1);
+        let one = &bad.disagreements[0];
+        let text = text(&bad, "m");
+        let voxel = format!("{:?}", one.voxel.expect("a voxel"));
+        let point = format!("{:?}", one.point.to_array());
+        let distance = format!("{:e}", one.parts[0].distance);
+        for part in [
+            &voxel,
+            &point,
+            &distance,
+            &"the ring".to_owned(),
+            &"winding".to_owned(),
+        ] {
+            assert!(text.contains(part), "{part} is not in {text}");
+        }
+        let d = document(&bad, &scene, &grid);
+        assert_eq!(d["ok"], false);
+        assert_eq!(d["disagreements"][0]["point"][0], one.point.x);
+    }
+
+    /// A mesh with a hole is no proof, even where no sampled point tells.
+    #[test]
+    fn an_open_mesh_ends_with_1() {
+        let (_, scene, grid) = report("[]");
+        let torn = meshes(&scene, 0.05).expect("a mesh").into_iter().map(|m| {
+            let triangles: Vec<[DVec3; 3]> = m.mesh().corners().skip(1).collect();
+            m.with_triangles(&triangles)
+        });
+        let torn: Vec<PartMesh> = torn.collect();
+        let found = validate(
+            &scene,
+            &grid,
+            &torn,
+            Points::Random(64),
+            &|| Ok(()),
+            &|_| {},
+        );
+        let found = found.expect("nothing stops it");
+        assert_eq!(verdict(&found), 1);
+        assert!(text(&found, "m").contains("NOT CLOSED"));
+    }
 }

@@ -57,6 +57,10 @@ pub(super) enum NoOutline {
 /// Lengths that f64 does not tell from 0 in the region's unit.
 const ROUNDING: f64 = SAME_FACE;
 
+/// Corners nearer to their neighbour than this share of the tolerance are left out: programs that
+/// read single precision, or weld by distance, would make nothing of the triangles between.
+const SLIVER: f64 = 1e-3;
+
 impl Outline {
     /// The polygons of a boundary within `tolerance` of it, of at most `most` chords.
     pub(super) fn new(
@@ -85,12 +89,17 @@ impl Outline {
             chords.extend(run.windows(2).map(|w| [w[0], w[1]]));
         }
         points.merge(&mut chords);
-        let loops = loops(&points.all, &chords).map_err(NoOutline::Open)?;
+        let mut loops = loops(&points.all, &chords).map_err(NoOutline::Open)?;
+        let left_out = SLIVER * tolerance;
+        for corners in &mut loops {
+            leave_out(corners, &points.all, left_out);
+        }
+        let points = used(points.all, &mut loops);
         Ok(Self {
-            points: points.all,
+            points,
             loops,
             // Points move by a rounding when they are evaluated and when they are welded.
-            error: error + 8.0 * ROUNDING,
+            error: error + left_out + 8.0 * ROUNDING,
         })
     }
 
@@ -108,6 +117,59 @@ impl Outline {
         };
         self.loops.iter().map(of_loop).sum()
     }
+}
+
+/// Leaves out corners that are within `near` of the one before; of two, one on the axis stays. The
+/// chord past a corner left out is no further from it than that.
+fn leave_out(corners: &mut Vec<u32>, points: &[[f64; 2]], near: f64) {
+    let at = |i: u32| points[i as usize];
+    let close = |a: u32, b: u32| {
+        let (p, q) = (at(a), at(b));
+        (p[0] - q[0]).hypot(p[1] - q[1]) <= near
+    };
+    let mut kept: Vec<u32> = Vec::with_capacity(corners.len());
+    for &corner in corners.iter() {
+        match kept.last_mut() {
+            Some(last) if close(*last, corner) => {
+                if at(corner)[0] == 0.0 && at(*last)[0] != 0.0 {
+                    *last = corner;
+                }
+            }
+            _ => kept.push(corner),
+        }
+    }
+    while let &[first, .., last] = kept.as_slice()
+        && close(first, last)
+    {
+        // The first and the last are neighbours as well.
+        if at(last)[0] == 0.0 && at(first)[0] != 0.0 {
+            kept[0] = last;
+        }
+        kept.pop();
+    }
+    // A loop no larger than that stays as it is.
+    if kept.len() > 2 {
+        *corners = kept;
+    }
+}
+
+/// The points that loops still have, and the loops over them.
+fn used(points: Vec<[f64; 2]>, loops: &mut [Vec<u32>]) -> Vec<[f64; 2]> {
+    let mut wanted = vec![false; points.len()];
+    for &i in loops.iter().flatten() {
+        wanted[i as usize] = true;
+    }
+    let mut to = vec![0; points.len()];
+    let mut count = 0;
+    for (i, &is) in wanted.iter().enumerate() {
+        to[i] = count;
+        count += u32::from(is);
+    }
+    for i in loops.iter_mut().flatten() {
+        *i = to[*i as usize];
+    }
+    let kept = points.into_iter().zip(wanted);
+    kept.filter_map(|(p, is)| is.then_some(p)).collect()
 }
 
 /// Distinct points, those of the pieces' ends first.

@@ -310,15 +310,20 @@ mod tests {
 
     #[test]
     fn points_are_where_the_axes_say() {
-        let points = vec![[1.0, 1e-1], [0.1, 1e-3]];
+        let points = vec![[1.0, 2e-2], [0.1, 2e-4]];
         let panel = panel(points);
         let axes = Axes::new(&panel, 0.0);
         let picture = log_plot(&[panel]);
-        assert!(has(&picture, axes.at([0.0, -1.0]), colour::material(0)));
-        assert!(has(&picture, axes.at([-1.0, -3.0]), colour::material(0)));
-        assert!(has(&picture, axes.at([-0.5, -2.0]), colour::material(0)));
-        assert!(!has(&picture, axes.at([-0.5, -2.4]), colour::material(0)));
-        let [low, high] = [axes.at([-1.0, -3.0]), axes.at([0.0, -1.0])];
+        let two = 2_f64.log10();
+        for log in [[0.0, two - 2.0], [-1.0, two - 4.0], [-0.5, two - 3.0]] {
+            assert!(has(&picture, axes.at(log), colour::material(0)), "{log:?}");
+        }
+        assert!(!has(
+            &picture,
+            axes.at([-0.5, two - 3.4]),
+            colour::material(0)
+        ));
+        let [low, high] = [axes.at([-1.0, -3.0]), axes.at([0.0, -2.0])];
         assert!(low[0] < high[0] && low[1] > high[1]);
     }
 

@@ -265,7 +265,7 @@ fn unknown_keys_are_refused_with_the_nearest() {
     refuses(
         &small("schema = 1", "schema = 1\nflavour = 3"),
         "vase.toml:2:1: flavour: found unknown key `flavour`, wanted one of schema, name, units, grid, \
-         output, materials, profiles, solid",
+         output, materials, profiles, solid, reference",
     );
     refuses(
         &small("radius = 1", "radius = 1\nradii = [1, 1]"),
@@ -280,7 +280,7 @@ fn unknown_keys_are_refused_with_the_nearest() {
     assert_eq!(
         message(json("{\"schema\": 1,\n  \"sollid\": []}")),
         "vase.json:2:3: sollid: found unknown key `sollid`, wanted one of schema, name, units, grid, \
-         output, materials, profiles, solid; did you mean `solid`?",
+         output, materials, profiles, solid, reference; did you mean `solid`?",
     );
 }
 

@@ -231,8 +231,9 @@ impl<'a> Field<'a> {
             changes[axis] = (high + low - 2.0 * here) / step;
             noise += (rounding(below) + rounding(above) + 2.0 * rounding(s.value)) / step;
         }
-        // Crossing zero on an empty composite, or f32's own range.
-        if !gradient.is_finite() {
+        // An empty composite is infinitely far, as far as f32 goes.
+        let infinite = |v: f64| v.abs() >= f64::from(f32::MAX);
+        if infinite(here) || !gradient.is_finite() {
             return None;
         }
         let error = (gradient.length() - 1.0).abs();
