@@ -24,11 +24,12 @@ use std::sync::Arc;
 const TOLERANCE: f64 = 1e-12;
 /// Panels to begin with, times the bodies that each may cross: more are not begun.
 const MOST_BEGUN: usize = 300_000;
-/// Stretches of circles looked at after which the estimates are taken as they are: half a minute's work.
-const MOST_WORK: u64 = 40_000_000;
+/// Stretches of circles looked at, those against free-form curves counted several times, after which
+/// the estimates are taken as they are: some seconds' work.
+const MOST_WORK: u64 = 6_000_000;
 /// Stretches after which a round of panels is given up: where surfaces nearly coincide each of its
 /// circles takes thousands.
-const MOST_OF_A_ROUND: u64 = 3 * MOST_WORK;
+const MOST_OF_A_ROUND: u64 = 2 * MOST_WORK;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 /// Places of the quantities.

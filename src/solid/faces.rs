@@ -36,6 +36,8 @@ pub(super) struct Faces {
     reach: f64,
     /// How far beside a surface its two sides are asked.
     hair: f64,
+    /// What a stretch costs against each body, compared with one of lines and arcs.
+    prices: Vec<u64>,
     work: AtomicU64,
 }
 
@@ -105,7 +107,10 @@ impl Faces {
                 near.collect()
             })
             .collect();
+        let free = |b: &Body| b.boundary().iter().any(|p| p.piece.degree() > 2);
+        let prices = bodies.iter().map(|b| if free(b) { 10 } else { 1 });
         Self {
+            prices: prices.collect(),
             bodies,
             terms,
             others,
@@ -290,7 +295,8 @@ impl Faces {
             let room = [0.125 * self.hair, 4.0 * self.hair];
             let search = |path: &Path, cuts: &mut Vec<f64>| {
                 let found = path.crossings(other, rule.range, room, cuts);
-                self.work.fetch_add(found.stretches, Ordering::Relaxed);
+                let work = found.stretches * self.prices[k];
+                self.work.fetch_add(work, Ordering::Relaxed);
                 found.along
             };
             if search(&rule.beside[1], &mut cuts) {
