@@ -101,9 +101,9 @@ pub(super) fn check_size(width: usize, height: usize) -> Result<(), PictureError
 /// "#)?;
 /// let small = RenderOptions { width: 64, height: 48, ..RenderOptions::default() };
 /// let picture = render(&scene, &small, &|| false)?;
-/// // The hole of the ring is in the middle, and the background in the corner.
+/// // The background is in the corner, the tube of the ring at the left.
 /// assert_eq!(picture.pixel(0, 0), [247, 247, 248]);
-/// assert!(picture.pixel(4, 24)[0] < 200);
+/// assert!(picture.pixel(10, 24)[0] < 200);
 /// # Ok::<(), voxlathe::Error>(())
 /// ```
 pub fn render(
