@@ -1,11 +1,11 @@
 //! `[reference]`: the closed form that a scene is compared with.
 
 use super::error::Fault;
-use super::fields::{each, elements, kinded, length, number};
+use super::fields::{kinded, length, number};
 use super::keys;
 use super::limits::MIN_MAGNITUDE;
-use super::model::{AxisModel, ReferenceModel};
-use super::solid::{axis, step};
+use super::model::ReferenceModel;
+use super::solid::placed;
 use super::value::Value;
 use crate::solid::Shape;
 
@@ -50,19 +50,7 @@ pub(super) fn reference(value: &Value) -> Result<ReferenceModel, Fault> {
             radius: size("radius")?,
         },
     };
-    let axis = fields.read("axis", axis)?.unwrap_or(AxisModel {
-        origin: [0.0; 3],
-        direction: [0.0, 0.0, 1.0],
-        x: None,
-        place: value.place,
-    });
-    let steps = fields
-        .read("place", |value| {
-            each(elements(value, "an array of steps")?, |_, value| {
-                step(value)
-            })
-        })?
-        .unwrap_or_default();
+    let (axis, steps) = placed(&fields, value.place)?;
     Ok(ReferenceModel {
         shape,
         axis,

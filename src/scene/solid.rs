@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::error::{Fault, Sources, push_index, shorten};
+use super::error::{Fault, Place, Sources, push_index, shorten};
 use super::fields::{
     Fields, choice, choices, direction, each, elements, find, finite, integer, kinded, largest,
     name, number, string, vector,
@@ -92,19 +92,7 @@ fn solid(
         })?
         .unwrap_or(360.0);
     let start = fields.read("start", finite)?.unwrap_or(0.0);
-    let axis = fields.read("axis", axis)?.unwrap_or(AxisModel {
-        origin: [0.0; 3],
-        direction: [0.0, 0.0, 1.0],
-        x: None,
-        place: value.place,
-    });
-    let steps = fields
-        .read("place", |value| {
-            each(elements(value, "an array of steps")?, |_, value| {
-                step(value)
-            })
-        })?
-        .unwrap_or_default();
+    let (axis, steps) = placed(&fields, value.place)?;
     let operation = fields
         .read("operation", |value| {
             let operation = choice(value, choices!(Operation))?;
@@ -138,7 +126,23 @@ fn solid(
     })
 }
 
-pub(super) fn axis(value: &Value) -> Result<AxisModel, Fault> {
+/// The axis of a table and the steps that place it, with their defaults.
+pub(super) fn placed(fields: &Fields, place: Place) -> Result<(AxisModel, Vec<PlaceStep>), Fault> {
+    let axis = fields.read("axis", axis)?.unwrap_or(AxisModel {
+        origin: [0.0; 3],
+        direction: [0.0, 0.0, 1.0],
+        x: None,
+        place,
+    });
+    let steps = fields.read("place", |value| {
+        each(elements(value, "an array of steps")?, |_, value| {
+            step(value)
+        })
+    })?;
+    Ok((axis, steps.unwrap_or_default()))
+}
+
+fn axis(value: &Value) -> Result<AxisModel, Fault> {
     let fields = Fields::new(value, keys::AXIS, "a table: an axis")?;
     let origin = fields.read("origin", vector)?.unwrap_or([0.0; 3]);
     let along = fields
@@ -163,7 +167,7 @@ pub(super) fn axis(value: &Value) -> Result<AxisModel, Fault> {
     })
 }
 
-pub(super) fn step(value: &Value) -> Result<PlaceStep, Fault> {
+fn step(value: &Value) -> Result<PlaceStep, Fault> {
     let wanted = "a step: a table of one of scale, rotate, translate";
     let fields = Fields::new(value, keys::STEP, wanted)?;
     let scale = fields.read("scale", |value| {
