@@ -26,21 +26,25 @@
 mod basis;
 mod bezier;
 mod cache;
+mod cell;
 mod curve;
 mod error;
 mod homogeneous;
 mod kernel;
 mod knot_vector;
 mod refine;
+mod tensor;
 #[cfg(test)]
 mod testing;
 
 pub use basis::{LocalBasis, MAX_DERIVATIVE_ORDER};
 pub use bezier::{BezierPiece, RationalBezier};
 pub use cache::{BasisCache, BasisTable, combine, tabulate};
+pub use cell::BezierCell;
 pub use curve::NurbsCurve;
 pub use error::NurbsError;
 pub use homogeneous::{Homogeneous, rational_derivatives};
 pub use kernel::{Kernel, SimdLevel};
 pub use knot_vector::{KnotSpan, KnotVector, MAX_DEGREE, MAX_KNOT_MAGNITUDE, MIN_SPAN_WIDTH};
 pub use refine::{clamp, elevate_degree, insert_knot, refine_knots};
+pub use tensor::{NurbsSurface, NurbsTensor, NurbsVolume};
