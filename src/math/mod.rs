@@ -10,7 +10,9 @@ pub mod tetrahedra;
 pub mod tolerance;
 
 mod aabb;
+mod side;
 
 pub use aabb::Aabb;
 pub use dd::{Dd, Real};
+pub use side::Side;
 pub use similarity::Similarity;

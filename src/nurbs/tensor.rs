@@ -191,7 +191,9 @@ impl<const N: usize> NurbsTensor<N> {
         let found: Result<Vec<_>, _> = (self.knots.iter().zip(at))
             .map(|(knots, u)| knots.basis_functions(u, order))
             .collect();
-        Ok(found?.try_into().unwrap_or_else(|_| unreachable!("one for each parameter")))
+        Ok(found?
+            .try_into()
+            .unwrap_or_else(|_| unreachable!("one for each parameter")))
     }
 
     /// Σ N_i N_j .. (w P, w) for rows of basis values over the spans of `bases`.

@@ -2,7 +2,7 @@
 
 use super::camera::View;
 use crate::math::Aabb;
-use crate::region::Side;
+use crate::math::Side;
 use crate::solid::{Assembly, Part, Reaches, signed};
 use glam::DVec3;
 

@@ -28,7 +28,6 @@ pub use curve::ProfileCurve;
 pub use distance::DistanceSet;
 pub use error::RegionError;
 pub use profile::{Boundary, Fill, ProfileLoop, Region};
-pub use section::Side;
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
 pub(crate) use crossings::MeridianPoint;

@@ -6,7 +6,7 @@
 
 use super::divided;
 use crate::grid::GridSpec;
-use crate::region::Side;
+use crate::math::Side;
 use crate::solid::{Assembly, CellShape, Factor, TOLERANCE, Term};
 use glam::DVec3;
 

@@ -3,7 +3,7 @@
 use super::fraction::FractionSampler;
 use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
-use crate::region::Side;
+use crate::math::Side;
 use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Row, signed};
 use std::sync::Arc;
 

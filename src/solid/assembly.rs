@@ -13,7 +13,7 @@ use super::body::Body;
 use super::part::{Operation, Part};
 use super::terms::{Factor, Term, terms};
 use crate::math::Aabb;
-use crate::region::Side;
+use crate::math::Side;
 use glam::DVec3;
 use std::sync::Arc;
 

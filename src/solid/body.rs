@@ -12,9 +12,10 @@
 use super::bounds;
 use super::row::RowSurface;
 use super::turn::{Turn, Wedge};
+use crate::math::Side;
 use crate::math::similarity::DdVec;
 use crate::math::{Aabb, Real, Similarity};
-use crate::region::{BoundaryPiece, Box2, BoxTree, DistanceSet, MeridianPoint, Section, Side};
+use crate::region::{BoundaryPiece, Box2, BoxTree, DistanceSet, MeridianPoint, Section};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 

@@ -10,9 +10,10 @@
 //! at an end of a piece.
 
 use super::turn::Turn;
+use crate::math::Side;
 use crate::math::bernstein::{self, Coefficients};
 use crate::math::{Aabb, Dd, Real, Similarity};
-use crate::region::{BoundaryPiece, Side};
+use crate::region::BoundaryPiece;
 use glam::DVec3;
 
 pub(super) fn bounds(frame: &Similarity, turn: &Turn, boundary: &[BoundaryPiece]) -> Aabb {

@@ -7,7 +7,7 @@
 
 use super::body::Body;
 use super::turn::Turn;
-use crate::region::Side;
+use crate::math::Side;
 use glam::{DVec2, DVec3};
 
 /// A parametrised path in space.

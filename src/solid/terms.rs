@@ -17,7 +17,7 @@ use super::coaxial::{Combination, Joined, same_axis, same_turn};
 use super::part::{Operation, Part};
 use super::turn::Turn;
 use crate::math::Aabb;
-use crate::region::Side;
+use crate::math::Side;
 use std::sync::Arc;
 
 /// A solid of a term, or its complement.

@@ -1,8 +1,8 @@
 //! How far a profile is turned.
 
+use crate::math::Side;
 use crate::math::tolerance::{ON_BOUNDARY, U};
 use crate::math::{Dd, Real};
-use crate::region::Side;
 use glam::DVec2;
 
 /// A full turn, or the wedge between two half-planes.
