@@ -18,6 +18,7 @@ mod cap;
 mod crossings;
 mod nearest;
 mod outline;
+mod revolved;
 mod tessellate;
 mod tree;
 mod triangles;
@@ -25,9 +26,12 @@ mod winding;
 
 pub use crossings::RayCrossings;
 pub use nearest::Nearest;
-pub use tessellate::{MAX_TRIANGLES, tessellate};
+pub use tessellate::tessellate;
 pub use tree::MeshTree;
 pub use triangles::Mesh;
+
+/// The most triangles of one mesh.
+pub const MAX_TRIANGLES: usize = 20_000_000;
 
 /// Why there is no mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

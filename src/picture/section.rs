@@ -530,7 +530,8 @@ impl Drawing<'_> {
             ..Pen::solid(1.3 * unit, ink())
         };
         let mut lines: Vec<CentreLine> = Vec::new();
-        for part in self.field.assembly.parts() {
+        let parts = self.field.assembly.parts().iter();
+        for part in parts.filter(|p| p.body().revolved().is_some()) {
             let frame = part.body().frame();
             let (origin, axis) = (frame.origin(), frame.axis(2));
             let bounds = part.bounds();

@@ -14,7 +14,7 @@
 
 use super::fraction::{Share, open_terms, reach};
 use crate::math::tetrahedra::{HalfSpace, box_volume_within};
-use crate::solid::{Assembly, Body, CellShape, Factor, TOLERANCE, Term};
+use crate::solid::{Assembly, Body, Factor, TOLERANCE, Term};
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::collections::BinaryHeap;
@@ -88,7 +88,7 @@ impl Voxel<'_> {
 
     /// A body's share of a cell.
     fn alone(&self, b: usize, centre: DVec3, sides: DVec3, spaces: &[HalfSpace]) -> f64 {
-        let shape = CellShape::new(self.body(b).frame(), sides);
+        let shape = self.body(b).voxel_shape(sides);
         let tolerance = self.tolerance(sides);
         self.body(b)
             .fraction_within(&shape, centre, spaces, tolerance)

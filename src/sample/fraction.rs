@@ -7,13 +7,13 @@
 use super::divided;
 use crate::grid::GridSpec;
 use crate::math::Side;
-use crate::solid::{Assembly, CellShape, Factor, TOLERANCE, Term};
+use crate::solid::{Assembly, Factor, TOLERANCE, Term, VoxelShape};
 use glam::DVec3;
 
 #[derive(Debug)]
 pub(super) struct FractionSampler {
     sides: DVec3,
-    shapes: Vec<CellShape>,
+    shapes: Vec<VoxelShape>,
     /// Half a diagonal in scene units, a hair more.
     reach: f64,
 }
@@ -23,7 +23,7 @@ impl FractionSampler {
         let shapes = assembly
             .bodies()
             .iter()
-            .map(|b| CellShape::new(b.frame(), sides))
+            .map(|b| b.voxel_shape(sides))
             .collect();
         Self {
             sides,
@@ -77,8 +77,8 @@ impl FractionSampler {
                     [] => 0.0,
                     [term] if term.factors.len() == 1 => {
                         let one = term.factors[0];
-                        let share =
-                            bodies[one.body].fraction(&self.shapes[one.body], centre, TOLERANCE);
+                        let shape = &self.shapes[one.body];
+                        let share = bodies[one.body].fraction_within(shape, centre, &[], TOLERANCE);
                         if one.complement { 1.0 - share } else { share }
                     }
                     several => divided::share(assembly, several, centre, self.sides),

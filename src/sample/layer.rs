@@ -186,7 +186,7 @@ impl<'a> LayerSampler<'a> {
         };
         let corner = self.grid.centre(0, 0, k);
         let surfaces = self.surfaces.iter();
-        let layers: Vec<LayerCuts> = surfaces.map(|s| s.rows().layer(corner)).collect();
+        let layers: Vec<LayerCuts> = surfaces.map(|s| s.layer(corner)).collect();
         for j in 0..ny {
             if self.cancel.is_some_and(|cancel| cancel()) {
                 return;
@@ -233,7 +233,7 @@ impl<'a> LayerSampler<'a> {
                 sides.fill(Side::Outside);
                 continue;
             }
-            body.rows().cuts(layer, &row, &mut scratch.cuts);
+            body.cuts(layer, &row, &mut scratch.cuts);
             scratch.cuts.runs(|from, to| {
                 let middle = self.grid.centre(from + (to - from) / 2, j, k);
                 sides[from..=to].fill(body.side(middle));

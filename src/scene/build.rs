@@ -454,7 +454,7 @@ fn part(model: &SceneModel, solid: &SolidModel, region: Arc<Region>) -> Result<P
         angle, start, axis, ..
     } = &solid.kind;
     let frame = frame(model, axis, &solid.steps, &solid.path)?;
-    let part = Part::new(
+    let part = Part::revolved(
         solid.name.clone(),
         solid.material,
         region,

@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::part::{Operation, Part};
+use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::similarity::{DdVec, dot};
 use crate::math::{Dd, Real, Similarity};
@@ -48,23 +49,26 @@ fn along(a: &Similarity, b: &Similarity) -> Option<Along> {
 
 /// Whether two parts share their axis, in either direction.
 pub(super) fn same_axis(a: &Part, b: &Part) -> bool {
-    along(a.body().frame(), b.body().frame()).is_some()
+    match (a.turned(), b.turned()) {
+        (Some((_, a)), Some((_, b))) => along(a.frame(), b.frame()).is_some(),
+        _ => false,
+    }
 }
 
 /// Whether two parts that share their axis share their turn too.
 pub(super) fn same_turn(a: &Part, b: &Part) -> bool {
-    match (a.body().turn(), b.body().turn()) {
+    let (Some((_, a)), Some((_, b))) = (a.turned(), b.turned()) else {
+        return false;
+    };
+    match (a.turn(), b.turn()) {
         (Turn::Full, Turn::Full) => true,
         (Turn::Partial(s), Turn::Partial(t)) if s.degrees() == t.degrees() => {
-            let world = |p: &Part, d: [Dd; 2]| -> DdVec {
-                let (x, y) = (
-                    p.body().frame().axis_exact(0),
-                    p.body().frame().axis_exact(1),
-                );
+            let world = |p: &Revolved, d: [Dd; 2]| -> DdVec {
+                let (x, y) = (p.frame().axis_exact(0), p.frame().axis_exact(1));
                 std::array::from_fn(|i| x[i] * d[0] + y[i] * d[1])
             };
             let ([s0, s1], [mut t0, mut t1]) = (s.directions_exact(), t.directions_exact());
-            let up = |p: &Part| p.body().frame().axis_exact(2);
+            let up = |p: &Revolved| p.frame().axis_exact(2);
             if dot(up(a), up(b)) < Dd::ZERO {
                 // Seen from the other tip of the axis the turn runs the other way.
                 (t0, t1) = (t1, t0);
@@ -120,15 +124,20 @@ impl Combination<'_> {
         {
             return Joined::Solid(parts[one].body().clone());
         }
+        let Some((_, turned)) = parts[self.turned].turned() else {
+            return Joined::Tangled;
+        };
         let frame = self.frame(parts);
         let mut pieces: Vec<Piece> = Vec::new();
         let mut owner = Vec::new();
         for (slot, &(_, i)) in self.steps.iter().enumerate() {
-            let Some(Along { k, h, d }) = along(&frame, parts[i].body().frame()) else {
+            let Some((region, body)) = parts[i].turned() else {
                 return Joined::Tangled;
             };
-            let boundary = parts[i].region().boundary();
-            pieces.extend(boundary.iter().map(|b| b.piece.mapped(k, h, d)));
+            let Some(Along { k, h, d }) = along(&frame, body.frame()) else {
+                return Joined::Tangled;
+            };
+            pieces.extend(region.boundary().iter().map(|b| b.piece.mapped(k, h, d)));
             owner.resize(pieces.len(), slot);
         }
         let holds = |w: &[Winding]| self.holds(w);
@@ -143,8 +152,10 @@ impl Combination<'_> {
             return Joined::Tangled;
         };
         let section = Arc::new(Section::enclosed(&boundary));
-        let turn = parts[self.turned].body().turn().clone();
-        Joined::Solid(Arc::new(Body::new(frame, turn, section, boundary)))
+        let turn = turned.turn().clone();
+        Joined::Solid(Arc::new(Body::Revolved(Revolved::new(
+            frame, turn, section, boundary,
+        ))))
     }
 
     /// The frame of the part that gives the turn, with the unit of the largest part, so that no

@@ -8,13 +8,11 @@
 
 use super::body::Body;
 use super::path::Path;
+use super::rule::{Patch, Rule};
 use super::seeds::Seeds;
 use super::terms::Term;
-use super::turn::Turn;
-use crate::math::Aabb;
-use crate::math::Side;
-use crate::region::BoundaryPiece;
-use glam::{DVec2, DVec3};
+use crate::math::{Aabb, Side};
+use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -42,59 +40,17 @@ pub(super) struct Faces {
     work: AtomicU64,
 }
 
-/// One sheet of a body's surface over one piece of its boundary.
+/// One patch of one body's surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sheet {
     body: usize,
-    piece: usize,
-    /// `None` for what the piece sweeps; else the cap, 0 or 1.
-    cap: Option<usize>,
+    patch: Patch,
 }
 
 impl Sheet {
     /// A number for an order.
-    pub(super) fn number(self) -> (usize, usize, usize) {
-        (self.body, self.piece, self.cap.map_or(0, |c| c + 1))
-    }
-}
-
-/// A line on a sheet with what its integrals need.
-struct Rule {
-    path: Path,
-    /// The paths a hair outward and inward of the body.
-    beside: [Path; 2],
-    range: [f64; 2],
-    normal: Normal,
-    /// Area per unit of both parameters.
-    area: f64,
-}
-
-/// A normal outward of the body, its length the area per unit of both parameters.
-enum Normal {
-    /// `across cos s u + across sin s v + along`, u and v the unit vectors of the circle.
-    Turning {
-        across: f64,
-        u: DVec3,
-        v: DVec3,
-        along: DVec3,
-    },
-    Fixed(DVec3),
-}
-
-impl Normal {
-    fn at(&self, s: f64) -> DVec3 {
-        match *self {
-            Self::Turning {
-                across,
-                u,
-                v,
-                along,
-            } => {
-                let (sin, cos) = s.sin_cos();
-                (u * cos + v * sin) * across + along
-            }
-            Self::Fixed(n) => n,
-        }
+    pub(super) fn number(self) -> (usize, Patch) {
+        (self.body, self.patch)
     }
 }
 
@@ -108,8 +64,7 @@ impl Faces {
                 near.collect()
             })
             .collect();
-        let free = |b: &Body| b.boundary().iter().any(|p| p.piece.degree() > 2);
-        let prices = bodies.iter().map(|b| if free(b) { 10 } else { 1 });
+        let prices = bodies.iter().map(|b| b.price());
         Self {
             prices: prices.collect(),
             bodies,
@@ -127,26 +82,15 @@ impl Faces {
         let mut sheets = Vec::new();
         let mut left = most;
         for (body, b) in self.bodies.iter().enumerate() {
-            let turned = *b.turn() != Turn::Full;
             let others = self.others[body].iter().map(|&k| &*self.bodies[k]);
             // A cap is cut by the heights of its own edges too.
-            let seeds = Seeds::new(b, others.chain(turned.then_some(&**b)));
-            for (piece, part) in b.boundary().iter().enumerate() {
-                if part.piece.on_axis {
-                    continue;
-                }
-                let cuts = seeds.cuts(&part.piece);
-                let caps = if turned && !part.piece.is_horizontal() {
-                    &[None, Some(0), Some(1)][..]
-                } else {
-                    &[None]
-                };
-                for &cap in caps {
-                    let sheet = Sheet { body, piece, cap };
-                    let cost = 1 + self.others[body].len();
-                    left = left.checked_sub(cost * (cuts.len() - 1))?;
-                    sheets.extend(cuts.windows(2).map(|w| (sheet, [w[0], w[1]])));
-                }
+            let own = b.has_caps().then_some(&**b);
+            let seeds = Seeds::new(b, others.chain(own));
+            for (patch, cuts) in b.patches(&seeds) {
+                let sheet = Sheet { body, patch };
+                let cost = 1 + self.others[body].len();
+                left = left.checked_sub(cost * (cuts.len() - 1))?;
+                sheets.extend(cuts.windows(2).map(|w| (sheet, [w[0], w[1]])));
             }
         }
         Some(sheets)
@@ -187,8 +131,7 @@ impl Faces {
         });
         #[allow(clippy::cast_precision_loss, reason = "a count of crossings")]
         let edges = edges as f64;
-        flux[QUANTITIES - 1] =
-            edges * self.bodies[sheet.body].frame().scale() * self.pace(sheet, t);
+        flux[QUANTITIES - 1] = edges * self.bodies[sheet.body].pace(sheet.patch, t);
         (flux, extremes)
     }
 
@@ -203,81 +146,9 @@ impl Faces {
         extremes
     }
 
-    fn part(&self, sheet: Sheet) -> &BoundaryPiece {
-        &self.bodies[sheet.body].boundary()[sheet.piece]
-    }
-
-    /// Length of the piece per unit of its parameter, in the body's unit.
-    fn pace(&self, sheet: Sheet, t: f64) -> f64 {
-        let [dr, dz] = self.part(sheet).piece.twin.slope(t);
-        dr.hypot(dz)
-    }
-
-    /// The line of a sheet at parameter `t` of its piece; `None` where it has no extent.
+    /// The line of a sheet at parameter `t`; `None` where it has no extent.
     fn rule(&self, sheet: Sheet, t: f64) -> Option<Rule> {
-        let body = &self.bodies[sheet.body];
-        let part = self.part(sheet);
-        let twin = &part.piece.twin;
-        let at = twin.at(t);
-        let (r, z) = (at[0] + twin.origin[0], at[1] + twin.origin[1]);
-        let [dr, dz] = twin.slope(t);
-        let sign = if part.forward { 1.0 } else { -1.0 };
-        let frame = body.frame();
-        let scale = frame.scale();
-        let hair = self.hair / scale;
-        if r <= 2.0 * hair {
-            return None;
-        }
-        let [e1, e2, e3] = [0, 1, 2].map(|i| frame.axis(i));
-        match sheet.cap {
-            None => {
-                let pace = dr.hypot(dz);
-                // Outward of the region: on the right of a piece with the region on its left.
-                let out = DVec2::new(dz, -dr) * (sign / pace);
-                if !out.is_finite() {
-                    return None;
-                }
-                let circle = |r: f64, z: f64| Path::Circle {
-                    centre: frame.to_world(DVec3::new(0.0, 0.0, z)),
-                    u: e1 * (r * scale),
-                    v: e2 * (r * scale),
-                };
-                let area = r * pace * scale * scale;
-                Some(Rule {
-                    path: circle(r, z),
-                    beside: [1.0, -1.0].map(|k| circle(r + k * hair * out.x, z + k * hair * out.y)),
-                    range: angles(body.turn()),
-                    normal: Normal::Turning {
-                        across: area * out.x,
-                        u: e1,
-                        v: e2,
-                        along: e3 * (area * out.y),
-                    },
-                    area,
-                })
-            }
-            Some(cap) => {
-                let Turn::Partial(wedge) = body.turn() else {
-                    return None;
-                };
-                let d = wedge.directions()[cap];
-                let outward = if cap == 0 { -d.perp() } else { d.perp() };
-                let out = e1 * outward.x + e2 * outward.y;
-                let line = |off: f64| Path::Line {
-                    start: frame.to_world(DVec3::new(0.0, 0.0, z)) + out * off,
-                    along: (e1 * d.x + e2 * d.y) * scale,
-                };
-                // Green's theorem: ∬ g dr dz = ∮ (∫_0^r g dr) dz, region on the left.
-                let area = sign * dz * scale * scale;
-                Some(Rule {
-                    path: line(0.0),
-                    beside: [line(self.hair), line(-self.hair)],
-                    range: [0.0, r],
-                    normal: Normal::Fixed(out * area),
-                    area,
-                })
-            }
-        }
+        self.bodies[sheet.body].rule(sheet.patch, t, self.hair)
     }
 
     /// Calls `each` with the stretches of a rule on the composite's boundary, and +1 where its
@@ -286,7 +157,8 @@ impl Faces {
         let [a, b] = rule.range;
         let mut cuts = Vec::new();
         let around = bounds(&rule.path, rule.range, 4.0 * self.hair);
-        let own = sheet.cap.map(|_| &sheet.body);
+        // What a body sweeps meets no face of its own; its flat caps do.
+        let own = sheet.patch.cap.map(|_| &sheet.body);
         for &k in self.others[sheet.body].iter().chain(own) {
             let other = &self.bodies[k];
             if !touch(&around, &other.bounds()) {
@@ -357,17 +229,6 @@ pub(super) fn direction(k: usize) -> DVec3 {
     if k < 3 { axis } else { -axis }
 }
 
-/// The angles of a turn, in radians.
-fn angles(turn: &Turn) -> [f64; 2] {
-    match turn {
-        Turn::Full => [0.0, TAU],
-        Turn::Partial(wedge) => {
-            let from = wedge.from().rem_euclid(360.0).to_radians();
-            [from, from + turn.radians()]
-        }
-    }
-}
-
 fn bounds(path: &Path, range: [f64; 2], margin: f64) -> Aabb {
     let of = |k: usize| path.support(direction(k), range);
     Aabb {
@@ -396,10 +257,11 @@ fn add_extremes(rule: &Rule, range: [f64; 2], extremes: &mut [f64; 6]) {
 }
 
 /// Adds the integrals over a stretch. Along a circle they are trigonometric polynomials of degree
-/// 4, along a line polynomials: eight points of a whole circle, or ten of a quarter, are exact.
+/// 4, along a line polynomials: eight points of a whole circle, or ten of a quarter, are exact. Where
+/// the area is a root, quarters are halved until two results agree.
 fn add_flux(rule: &Rule, [a, b]: [f64; 2], sign: f64, flux: &mut Flux) {
     let turning = matches!(rule.path, Path::Circle { .. });
-    if turning && b - a >= TAU {
+    if turning && b - a >= TAU && rule.is_polynomial() {
         for k in 0..8 {
             add_point(rule, a + f64::from(k) * (TAU / 8.0), sign, TAU / 8.0, flux);
         }
@@ -413,12 +275,42 @@ fn add_flux(rule: &Rule, [a, b]: [f64; 2], sign: f64, flux: &mut Flux) {
     let half = 0.5 * (b - a) / parts;
     let mut middle = a + half;
     while middle < b {
-        for (x, w) in GAUSS {
-            add_point(rule, middle - half * x, sign, half * w, flux);
-            add_point(rule, middle + half * x, sign, half * w, flux);
+        let part = gauss(rule, middle, half, sign);
+        let part = if rule.is_polynomial() {
+            part
+        } else {
+            halved(rule, [middle, half], sign, &part, 0)
+        };
+        for (f, v) in flux.iter_mut().zip(part) {
+            *f += v;
         }
         middle += 2.0 * half;
     }
+}
+
+/// The integrals over `middle ± half` with ten points.
+fn gauss(rule: &Rule, middle: f64, half: f64, sign: f64) -> Flux {
+    let mut flux = [0.0; QUANTITIES];
+    for (x, w) in GAUSS {
+        add_point(rule, middle - half * x, sign, half * w, &mut flux);
+        add_point(rule, middle + half * x, sign, half * w, &mut flux);
+    }
+    flux
+}
+
+/// The integrals over `middle ± half`, in halves until `whole`, the result for both, is confirmed.
+fn halved(rule: &Rule, [middle, half]: [f64; 2], sign: f64, whole: &Flux, depth: u32) -> Flux {
+    const DEPTH: u32 = 12;
+    let quarter = 0.5 * half;
+    let parts = [middle - quarter, middle + quarter].map(|m| (m, gauss(rule, m, quarter, sign)));
+    let sum: Flux = std::array::from_fn(|k| parts[0].1[k] + parts[1].1[k]);
+    let agree = |k: usize| (sum[k] - whole[k]).abs() <= 1e-14 * sum[k].abs();
+    // The area's integrand is the one that is not a polynomial.
+    if depth == DEPTH || agree(0) && agree(1) {
+        return sum;
+    }
+    let [a, b] = parts.map(|(m, part)| halved(rule, [m, quarter], sign, &part, depth + 1));
+    std::array::from_fn(|k| a[k] + b[k])
 }
 
 /// Adds the integrands at one point. By the divergence theorem,
@@ -428,9 +320,10 @@ fn add_flux(rule: &Rule, [a, b]: [f64; 2], sign: f64, flux: &mut Flux) {
 /// ```
 fn add_point(rule: &Rule, s: f64, sign: f64, weight: f64, flux: &mut Flux) {
     let x = rule.path.at(s);
-    let n = rule.normal.at(s) * (sign * weight);
+    let normal = rule.normal.at(s);
+    let n = normal * (sign * weight);
     let values = [
-        rule.area * weight,
+        rule.area(normal) * weight,
         x.dot(n) / 3.0,
         0.5 * x.x * x.x * n.x,
         0.5 * x.y * x.y * n.y,

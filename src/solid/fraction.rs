@@ -17,7 +17,7 @@
 //! For a polygon that changes with z the meetings with its corners are sought too, but cuts only
 //! save work: what they leave is found by the halving.
 
-use super::body::Body;
+use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::bernstein;
 use crate::math::disc::{self, Polygon};
@@ -28,7 +28,7 @@ use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
 
 /// Share of the voxel below which a sum of areas is taken as nothing, or as everything: rounding.
-const SNAP: f64 = 1e-11;
+pub(super) const SNAP: f64 = 1e-11;
 /// Estimated error of one stretch of a piece, as a share of the voxel: a hundredth of what is
 /// promised, for the few stretches a voxel meets.
 pub(crate) const TOLERANCE: f64 = 1e-8;
@@ -65,8 +65,12 @@ const EDGES: [[usize; 2]; 12] = [
 impl CellShape {
     /// The shape of a voxel with those side lengths (scene units) in a solid's frame.
     pub(crate) fn new(frame: &Similarity, sides: DVec3) -> Self {
-        let axes = [DVec3::X * sides.x, DVec3::Y * sides.y, DVec3::Z * sides.z]
-            .map(|v| frame.vector_to_local(v));
+        let axes = [DVec3::X * sides.x, DVec3::Y * sides.y, DVec3::Z * sides.z];
+        Self::of_edges(axes.map(|v| frame.vector_to_local(v)))
+    }
+
+    /// The shape of a parallelepiped with those edges, in local coordinates.
+    pub(super) fn of_edges(axes: [DVec3; 3]) -> Self {
         let corners: [DVec3; 8] = std::array::from_fn(|i| {
             let side = |bit: usize| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
             axes[0] * side(0) + axes[1] * side(1) + axes[2] * side(2)
@@ -127,9 +131,9 @@ fn on_edge(corners: &[DVec3; 8], [i, j]: [usize; 2], z: f64) -> DVec2 {
 
 /// A half-space in a solid's frame, from the voxel's centre.
 #[derive(Debug, Clone, Copy)]
-struct Clip {
-    normal: DVec3,
-    offset: f64,
+pub(super) struct Clip {
+    pub(super) normal: DVec3,
+    pub(super) offset: f64,
 }
 
 impl Clip {
@@ -210,13 +214,7 @@ struct Cell<'a> {
     tolerance: f64,
 }
 
-impl Body {
-    /// The share of the voxel centred on `centre` that the solid fills, between 0 and 1, each
-    /// stretch of the profile within an estimated error of `tolerance`.
-    pub(crate) fn fraction(&self, shape: &CellShape, centre: DVec3, tolerance: f64) -> f64 {
-        self.fraction_within(shape, centre, &[], tolerance)
-    }
-
+impl Revolved {
     /// The share of the voxel that lies in the solid and in all the half-spaces, which are given
     /// from the voxel's centre.
     pub(crate) fn fraction_within(
@@ -226,7 +224,19 @@ impl Body {
         spaces: &[HalfSpace],
         tolerance: f64,
     ) -> f64 {
-        let c = self.frame().to_local(centre).point;
+        let local = self.frame().to_local(centre).point;
+        let clips = spaces.iter().map(|s| self.clip(s));
+        self.local_fraction(shape, local, clips.collect(), tolerance)
+    }
+
+    /// The same in local coordinates.
+    pub(super) fn local_fraction(
+        &self,
+        shape: &CellShape,
+        c: DVec3,
+        clips: SmallVec<[Clip; 4]>,
+        tolerance: f64,
+    ) -> f64 {
         let flat = DVec2::new(c.x, c.y);
         let mut reach = Reach::Whole;
         if let Turn::Partial(wedge) = self.turn() {
@@ -249,7 +259,7 @@ impl Body {
             z: c.z,
             turn: self.turn(),
             reach,
-            clips: spaces.iter().map(|s| self.clip(s)).collect(),
+            clips,
             tolerance: tolerance * shape.volume,
         };
         let volume: f64 = (0..shape.slabs.len())

@@ -6,29 +6,38 @@
 
 mod analytic;
 mod assembly;
+mod block;
 mod body;
 mod bounds;
 mod coaxial;
 mod composite;
+mod ellipsoid;
 mod faces;
 mod fraction;
 mod measure;
 mod part;
 mod path;
+mod revolved;
 mod row;
+mod rule;
 mod seeds;
+mod swept;
 mod terms;
 mod turn;
 mod turned;
 
 pub use analytic::{Analytic, Shape};
 pub use assembly::Assembly;
+pub use block::Block;
 pub use body::Body;
+pub use ellipsoid::Ellipsoid;
 pub use measure::{MeasureErrors, Measures, Moments};
 pub use part::{Operation, Part};
+pub use revolved::Revolved;
 pub use turn::Turn;
 
 pub(crate) use assembly::{Reaches, signed};
-pub(crate) use fraction::{CellShape, TOLERANCE};
+pub(crate) use body::VoxelShape;
+pub(crate) use fraction::TOLERANCE;
 pub(crate) use row::{Cuts, LayerCuts, Row};
 pub(crate) use terms::{Factor, Term};

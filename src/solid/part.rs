@@ -1,6 +1,7 @@
 //! One solid of a scene by itself.
 
 use super::body::Body;
+use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::{Aabb, Similarity};
 use crate::region::Region;
@@ -19,20 +20,33 @@ pub enum Operation {
     Intersect,
 }
 
-/// One turned and placed region, and what it does to the solids before it.
+/// One placed solid, and what it does to the solids before it.
 #[derive(Debug, Clone)]
 pub struct Part {
     name: String,
     material: u32,
     operation: Operation,
-    region: Arc<Region>,
+    /// What is turned, where something is.
+    region: Option<Arc<Region>>,
     body: Arc<Body>,
 }
 
 impl Part {
+    /// A solid, to be added.
+    #[must_use]
+    pub fn new(name: String, material: u32, body: Body) -> Self {
+        Self {
+            name,
+            material,
+            operation: Operation::Add,
+            region: None,
+            body: Arc::new(body),
+        }
+    }
+
     /// A region turned about the third axis of `frame` (local lengths in scene units), to be added.
     #[must_use]
-    pub fn new(
+    pub fn revolved(
         name: String,
         material: u32,
         region: Arc<Region>,
@@ -41,12 +55,10 @@ impl Part {
     ) -> Self {
         let frame = frame.with_local_unit(region.unit());
         let (section, boundary) = (region.section().clone(), region.boundary().to_vec());
+        let body = Body::Revolved(Revolved::new(frame, turn, section, boundary));
         Self {
-            name,
-            material,
-            operation: Operation::Add,
-            region,
-            body: Arc::new(Body::new(frame, turn, section, boundary)),
+            region: Some(region),
+            ..Self::new(name, material, body)
         }
     }
 
@@ -80,8 +92,9 @@ impl Part {
         &self.body
     }
 
-    pub(crate) fn region(&self) -> &Region {
-        &self.region
+    /// The region that is turned, with what it became.
+    pub(super) fn turned(&self) -> Option<(&Region, &Revolved)> {
+        Some((self.region.as_deref()?, self.body.revolved()?))
     }
 
     /// The smallest box around the part, in scene units.
@@ -93,7 +106,7 @@ impl Part {
     /// What a user should know about the part's profile.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
-        self.region.warnings()
+        self.region.as_deref().map_or(&[], Region::warnings)
     }
 
     /// Whether the closed part holds the point.

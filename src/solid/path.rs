@@ -7,13 +7,13 @@
 
 use super::body::Body;
 use super::turn::Turn;
-use crate::math::Side;
+use crate::math::{Aabb, Side};
 use glam::{DVec2, DVec3};
 
 /// A parametrised path in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Path {
-    /// `centre + u cos s + v sin s`, u and v of one length and normal to each other.
+    /// `centre + u cos s + v sin s`, u and v normal to each other: a circle, or an ellipse.
     Circle { centre: DVec3, u: DVec3, v: DVec3 },
     /// `start + s along`.
     Line { start: DVec3, along: DVec3 },
@@ -30,9 +30,73 @@ const MANY: u64 = 4_096;
 const COARSE: f64 = 1e-3;
 
 /// Bounds of (ρ, z) over a stretch.
-struct Reach {
-    r: [f64; 2],
-    z: [f64; 2],
+pub(super) struct Reach {
+    pub(super) r: [f64; 2],
+    pub(super) z: [f64; 2],
+}
+
+/// The parameters `middle ± half` of a path in a body's own coordinates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch<'a> {
+    pub(super) path: &'a Path,
+    pub(super) middle: f64,
+    pub(super) half: f64,
+}
+
+impl Stretch<'_> {
+    /// Bounds of ρ and z over the stretch, by Taylor's formula.
+    pub(super) fn reach(&self) -> Reach {
+        let (path, half) = (self.path, self.half);
+        let p = path.at(self.middle);
+        let (d, bend) = path.slopes(self.middle);
+        let flat = DVec2::new(p.x, p.y);
+        let square = flat.length_squared();
+        let speed = path.speed();
+        let furthest = square.sqrt() + speed * half;
+        let tilt = match path {
+            Path::Circle { u, v, .. } => u.z.hypot(v.z),
+            Path::Line { .. } => 0.0,
+        };
+        // (ρ²)'' = 2 |P'|² + 2 P·P''
+        let curvature = 2.0 * (speed * speed + furthest * bend);
+        let rounding = 8.0 * f64::EPSILON * furthest * furthest;
+        let slope = 2.0 * flat.dot(DVec2::new(d.x, d.y)).abs();
+        let spread = slope * half + 0.5 * curvature * half * half + rounding;
+        let rise = d.z.abs() * half + 0.5 * tilt * half * half;
+        let root = |x: f64| x.max(0.0).sqrt();
+        Reach {
+            r: [root(square - spread), root(square + spread)],
+            z: [p.z - rise, p.z + rise],
+        }
+    }
+
+    /// Whether it may meet the planes of a wedge's caps.
+    pub(super) fn meets_caps(&self, turn: &Turn, margin: f64) -> bool {
+        let Turn::Partial(wedge) = turn else {
+            return false;
+        };
+        let p = self.path.at(self.middle);
+        let (velocity, bend) = self.path.slopes(self.middle);
+        let flat = DVec2::new(p.x, p.y);
+        let slope = DVec2::new(velocity.x, velocity.y);
+        wedge.directions().iter().any(|d| {
+            let room =
+                d.perp_dot(slope).abs() * self.half + 0.5 * bend * self.half * self.half + margin;
+            let beyond = self.path.speed() * self.half + margin;
+            d.perp_dot(flat).abs() <= room && d.dot(flat) >= -beyond
+        })
+    }
+
+    /// A box around the stretch.
+    pub(super) fn bounds(&self) -> Aabb {
+        let range = [self.middle - self.half, self.middle + self.half];
+        let furthest =
+            |sign: f64| DVec3::from_array(DVec3::AXES.map(|e| self.path.support(e * sign, range)));
+        Aabb {
+            min: -furthest(-1.0),
+            max: furthest(1.0),
+        }
+    }
 }
 
 impl Path {
@@ -46,10 +110,10 @@ impl Path {
         }
     }
 
-    /// Length per unit of the parameter.
+    /// The most length per unit of the parameter.
     pub(super) fn speed(&self) -> f64 {
         match self {
-            Self::Circle { u, .. } => u.length(),
+            Self::Circle { u, v, .. } => u.length().max(v.length()),
             Self::Line { along, .. } => along.length(),
         }
     }
@@ -91,44 +155,20 @@ impl Path {
         match *self {
             Self::Circle { u, v, .. } => {
                 let (sin, cos) = s.sin_cos();
-                (v * cos - u * sin, u.length())
+                (v * cos - u * sin, self.speed())
             }
             Self::Line { along, .. } => (along, 0.0),
         }
     }
 
-    /// Bounds of ρ and z over `middle ± half`, by Taylor's formula. Local coordinates.
-    fn reach(&self, middle: f64, half: f64) -> Reach {
-        let p = self.at(middle);
-        let (d, bend) = self.slopes(middle);
-        let flat = DVec2::new(p.x, p.y);
-        let square = flat.length_squared();
-        let speed = self.speed();
-        let furthest = square.sqrt() + speed * half;
-        let tilt = match self {
-            Self::Circle { u, v, .. } => u.z.hypot(v.z),
-            Self::Line { .. } => 0.0,
-        };
-        // (ρ²)'' = 2 |P'|² + 2 P·P''
-        let curvature = 2.0 * (speed * speed + furthest * bend);
-        let rounding = 8.0 * f64::EPSILON * furthest * furthest;
-        let slope = 2.0 * flat.dot(DVec2::new(d.x, d.y)).abs();
-        let spread = slope * half + 0.5 * curvature * half * half + rounding;
-        let rise = d.z.abs() * half + 0.5 * tilt * half * half;
-        let root = |x: f64| x.max(0.0).sqrt();
-        Reach {
-            r: [root(square - spread), root(square + spread)],
-            z: [p.z - rise, p.z + rise],
-        }
-    }
-
     /// Whether ρ and z do not change along the path, but for rounding.
-    fn is_coaxial(&self) -> bool {
+    pub(super) fn is_coaxial(&self) -> bool {
         match self {
             Self::Circle { centre, u, v } => {
                 let size = u.length();
                 let off = centre.x.hypot(centre.y);
-                off <= 1e-14 * size && u.z.hypot(v.z) <= 1e-14 * size
+                let round = (v.length() - size).abs() <= 1e-14 * size;
+                round && off <= 1e-14 * size && u.z.hypot(v.z) <= 1e-14 * size
             }
             Self::Line { .. } => false,
         }
@@ -144,10 +184,8 @@ impl Path {
         out: &mut Vec<f64>,
     ) -> Searched {
         let local = self.local(body);
-        let [margin_here, near_here] = [margin, near].map(|m| m / body.frame().scale());
         let mut along = false;
         let speed = self.speed();
-        let coaxial = local.is_coaxial();
         let signed = |s: f64| {
             let p = self.at(s);
             let outside = body.side(p) == Side::Outside;
@@ -158,18 +196,18 @@ impl Path {
                 -d
             }
         };
-        let mut work = vec![Stretch { a, b, ends: None }];
+        let mut work = vec![Open { a, b, ends: None }];
         let mut seen = 0_u64;
-        while let Some(Stretch { a, b, ends }) = work.pop() {
+        while let Some(Open { a, b, ends }) = work.pop() {
             seen += 1;
             let (m, h) = (0.5 * (a + b), 0.5 * (b - a));
-            let Reach { r, z } = local.reach(m, h);
-            let meets = |margin: f64| {
-                !coaxial && body.surface_overlaps(r, z, margin)
-                    || local.meets_caps(body.turn(), m, h, margin)
+            let stretch = Stretch {
+                path: &local,
+                middle: m,
+                half: h,
             };
-            if !meets(margin_here) {
-                along = along || meets(near_here);
+            if !body.may_meet(&stretch, margin) {
+                along = along || body.may_meet(&stretch, near);
                 continue;
             }
             let middle = signed(m);
@@ -198,7 +236,7 @@ impl Path {
                     Crossings::Unknown => {}
                 }
             }
-            let half = |a, b, ends| Stretch { a, b, ends };
+            let half = |a, b, ends| Open { a, b, ends };
             work.push(half(m, b, values.map(|[_, m, b]| [m, b])));
             work.push(half(a, m, values.map(|[a, m, _]| [a, m])));
         }
@@ -206,22 +244,6 @@ impl Path {
             along,
             stretches: seen,
         }
-    }
-
-    /// Whether a stretch may meet the planes of a wedge's caps. Local coordinates.
-    fn meets_caps(&self, turn: &Turn, middle: f64, half: f64, margin: f64) -> bool {
-        let Turn::Partial(wedge) = turn else {
-            return false;
-        };
-        let p = self.at(middle);
-        let (velocity, bend) = self.slopes(middle);
-        let flat = DVec2::new(p.x, p.y);
-        let slope = DVec2::new(velocity.x, velocity.y);
-        wedge.directions().iter().any(|d| {
-            let room = d.perp_dot(slope).abs() * half + 0.5 * bend * half * half + margin;
-            let beyond = self.speed() * half + margin;
-            d.perp_dot(flat).abs() <= room && d.dot(flat) >= -beyond
-        })
     }
 }
 
@@ -233,8 +255,8 @@ pub(super) struct Searched {
     pub(super) stretches: u64,
 }
 
-/// A stretch of a path with the signed distances of its ends, where they are known.
-struct Stretch {
+/// A stretch to look at, with the signed distances of its ends, where they are known.
+struct Open {
     a: f64,
     b: f64,
     ends: Option<[f64; 2]>,

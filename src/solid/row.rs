@@ -31,6 +31,27 @@ impl Row {
         let i = i as f64;
         self.first + DVec3::new(self.step * i, 0.0, 0.0)
     }
+
+    /// The row in a solid's own coordinates.
+    pub(super) fn local(&self, frame: &Similarity) -> LocalRow {
+        let first = frame.to_local(self.first);
+        let last = frame.to_local(self.centre_estimate(self.count - 1));
+        let along = frame.vector_to_local(DVec3::new(self.step, 0.0, 0.0));
+        let reach = first.point.abs().max(last.point.abs()).max_element();
+        let mut error = first.error.max(last.error).max_element() + 16.0 * f64::EPSILON * reach;
+        // The rounding of the step, over the whole self.
+        #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
+        let steps = self.count as f64;
+        error += 4.0 * f64::EPSILON * along.length() * steps;
+        // Voxel centres are rounded in the world, each on its own: off the line by an ulp there.
+        let far = self.first.abs().max_element() + self.step * steps;
+        error += 2.0 * f64::EPSILON * far * along.length() / self.step;
+        LocalRow {
+            start: first.point,
+            along,
+            error,
+        }
+    }
 }
 
 /// Cuts of one row, unsorted until [`Cuts::runs`].
@@ -41,7 +62,7 @@ pub(crate) struct Cuts {
 }
 
 impl Cuts {
-    fn reset(&mut self, count: usize) {
+    pub(super) fn reset(&mut self, count: usize) {
         self.list.clear();
         #[allow(clippy::cast_possible_wrap, reason = "voxel counts are below 2^31")]
         let last = count as i64 - 1;
@@ -49,7 +70,7 @@ impl Cuts {
     }
 
     /// Marks the parameters from `a` to `b` as a possible change.
-    fn add(&mut self, a: f64, b: f64) {
+    pub(super) fn add(&mut self, a: f64, b: f64) {
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
         let last = self.last as f64;
         if !(b >= -1.0 && a <= last + 1.0) {
@@ -109,10 +130,11 @@ pub(crate) enum LayerCuts {
 }
 
 /// A row in local coordinates: position = start + parameter * along, with a bound on the rounding.
-struct LocalRow {
-    start: DVec3,
-    along: DVec3,
-    error: f64,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LocalRow {
+    pub(super) start: DVec3,
+    pub(super) along: DVec3,
+    pub(super) error: f64,
 }
 
 impl RowSurface<'_> {
@@ -163,8 +185,7 @@ impl RowSurface<'_> {
 
     /// Collects the cuts of one row.
     pub(crate) fn cuts(&self, layer: &LayerCuts, row: &Row, cuts: &mut Cuts) {
-        cuts.reset(row.count);
-        let local = self.local_row(row);
+        let local = row.local(self.frame);
         match layer {
             LayerCuts::Radii(radii) => {
                 for &[low, high] in radii {
@@ -177,26 +198,6 @@ impl RowSurface<'_> {
             for d in wedge.directions() {
                 local.plane_crossing(d, row.count, cuts);
             }
-        }
-    }
-
-    fn local_row(&self, row: &Row) -> LocalRow {
-        let first = self.frame.to_local(row.first);
-        let last = self.frame.to_local(row.centre_estimate(row.count - 1));
-        let along = self.frame.vector_to_local(DVec3::new(row.step, 0.0, 0.0));
-        let reach = first.point.abs().max(last.point.abs()).max_element();
-        let mut error = first.error.max(last.error).max_element() + 16.0 * f64::EPSILON * reach;
-        // The rounding of the step, over the whole row.
-        #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
-        let steps = row.count as f64;
-        error += 4.0 * f64::EPSILON * along.length() * steps;
-        // Voxel centres are rounded in the world, each on its own: off the line by an ulp there.
-        let far = row.first.abs().max_element() + row.step * steps;
-        error += 2.0 * f64::EPSILON * far * along.length() / row.step;
-        LocalRow {
-            start: first.point,
-            along,
-            error,
         }
     }
 
@@ -336,14 +337,25 @@ impl LocalRow {
 
     /// Where the row meets the cap's plane through the axis along `d`.
     fn plane_crossing(&self, d: DVec2, count: usize, cuts: &mut Cuts) {
-        let p = DVec2::new(self.start.x, self.start.y);
-        let v = DVec2::new(self.along.x, self.along.y);
-        let (offset, slope) = (d.perp_dot(p), d.perp_dot(v));
-        let slack = 4.0 * self.error + 8.0 * f64::EPSILON * (p.x.abs() + p.y.abs());
-        let (a, b) = ((-slack - offset) / slope, (slack - offset) / slope);
+        let normal = DVec3::new(-d.y, d.x, 0.0);
+        self.plane_crossing_at(normal, 0.0, count, cuts);
+    }
+
+    /// Where the row meets the plane `normal · x = offset`, the normal of length 1.
+    pub(super) fn plane_crossing_at(
+        &self,
+        normal: DVec3,
+        offset: f64,
+        count: usize,
+        cuts: &mut Cuts,
+    ) {
+        let (height, slope) = (normal.dot(self.start) - offset, normal.dot(self.along));
+        let size = normal.abs().dot(self.start.abs()) + offset.abs();
+        let slack = 4.0 * self.error + 8.0 * f64::EPSILON * size;
+        let (a, b) = ((-slack - height) / slope, (slack - height) / slope);
         if a.is_finite() && b.is_finite() {
             cuts.add(a.min(b), a.max(b));
-        } else if offset.abs() <= slack {
+        } else if height.abs() <= slack {
             // Along the plane: every voxel on its own.
             #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
             cuts.add(-1.0, count as f64);

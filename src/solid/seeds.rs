@@ -17,6 +17,8 @@ use std::f64::consts::TAU;
 pub(super) struct Seeds {
     radii: Vec<f64>,
     heights: Vec<f64>,
+    /// Centres and radii of balls around the other bodies.
+    balls: Vec<(DVec3, f64)>,
 }
 
 impl Seeds {
@@ -33,6 +35,7 @@ impl Seeds {
     fn add_ball(&mut self, body: &Body, bounds: &Aabb) {
         let centre = body.frame().to_local(0.5 * (bounds.min + bounds.max)).point;
         let radius = 0.5 * bounds.sides().length() / body.frame().scale();
+        self.balls.push((centre, radius));
         let rho = centre.x.hypot(centre.y);
         for k in [-1.0, -0.5, 0.0, 0.5, 1.0] {
             self.radii.push(rho + k * radius);
@@ -43,6 +46,9 @@ impl Seeds {
     fn add_vertices(&mut self, body: &Body, other: &Body) {
         /// Points on a circle that its extreme radii are looked for among; they only seed.
         const POINTS: u32 = 32;
+        let Some(other) = other.revolved() else {
+            return;
+        };
         let frame = other.frame();
         let scale = frame.scale();
         for piece in other.boundary().iter().map(|b| &b.piece) {
@@ -70,6 +76,20 @@ impl Seeds {
             let (off, own) = (centre.x.hypot(centre.y), r * scale / body.frame().scale());
             self.radii.extend([low, high, off + own, (off - own).abs()]);
         }
+    }
+
+    /// Parameters at which a face is cut whose lines `place` puts at coordinates of a local axis, 0
+    /// and 1 included.
+    pub(super) fn along(&self, axis: usize, place: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut cuts = vec![0.0, 1.0];
+        for (centre, radius) in &self.balls {
+            let of = |k: f64| place(centre[axis] + k * radius);
+            cuts.extend([-1.0, -0.5, 0.0, 0.5, 1.0].map(of));
+        }
+        cuts.retain(|t| (0.0..=1.0).contains(t));
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup_by(|a, b| (*a - *b).abs() <= 1e-14);
+        cuts
     }
 
     /// Parameters at which a piece is cut, 0 and 1 included.

@@ -87,7 +87,7 @@ impl Draft {
         if !same_axis(own, other) {
             return false;
         }
-        let full = |p: &Part| *p.body().turn() == Turn::Full;
+        let full = |p: &Part| p.turned().is_some_and(|(_, b)| *b.turn() == Turn::Full);
         let takes = same_turn(own, other)
             // What a full turn takes from part of a turn, it takes in every half-plane of it.
             || operation != Operation::Add && full(other) && !self.complement();

@@ -19,9 +19,9 @@
 //! * Source: ∭ f = ∬ r ∫ f dφ dr dz with ξ = r cos φ, η = r sin φ, |φ| <= h; ∫ dφ = k₀, ∫ cos φ = k₁,
 //!   ∫ cos² φ = k₂, ∫ sin² φ = k₃. The tests hold cylinder, cone, sphere, hemisphere and torus.
 
-use super::body::Body;
 use super::measure::{Measures, Moments};
 use super::part::Part;
+use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::similarity::DdVec;
@@ -40,7 +40,7 @@ const WRITTEN: f64 = 8.0 * f64::EPSILON;
 /// Rounding of a placement of many steps, relative to its lengths.
 const PLACEMENT: f64 = 1.0 / (1_u128 << 90) as f64;
 
-impl Body {
+impl Revolved {
     /// Volume, area and moments, about the f64 point nearest to the centroid.
     ///
     /// Errors stay near the rounding of f64 for any angle, placement and scale, also where the
@@ -48,18 +48,6 @@ impl Body {
     #[must_use]
     pub fn moments(&self) -> Moments {
         moments(self.frame(), self.turn(), self.boundary())
-    }
-
-    /// What a user reads of [`moments`](Self::moments), with the bounds.
-    #[must_use]
-    pub fn measures(&self) -> Measures {
-        self.moments().measures(Some(self.bounds()))
-    }
-
-    /// Volume in cubed scene units, with an estimate of its error.
-    #[must_use]
-    pub fn volume(&self) -> Integral {
-        self.moments().volume
     }
 }
 
@@ -338,7 +326,7 @@ fn added(a: Estimate, b: Estimate) -> Estimate {
 mod tests {
     use super::*;
     use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region};
-    use crate::solid::Assembly;
+    use crate::solid::{Assembly, Body};
     use std::f64::consts::PI;
     use std::sync::Arc;
 
@@ -368,12 +356,12 @@ mod tests {
 
     fn body(loops: &[ProfileLoop], boundary: Boundary, turn: Turn, frame: &Similarity) -> Body {
         let region = Region::new(loops, boundary, Fill::EvenOdd).expect("a region");
-        Body::new(
+        Body::Revolved(Revolved::new(
             frame.with_local_unit(region.unit()),
             turn,
             region.section().clone(),
             region.boundary().to_vec(),
-        )
+        ))
     }
 
     fn upright() -> Similarity {
@@ -662,7 +650,7 @@ mod tests {
             let circle = [vec![arc([0.0, 0.0], 1.0, -90.0, 90.0)]];
             let region = Region::new(&circle, Boundary::ToAxis, Fill::EvenOdd).expect("a region");
             let frame = upright().rotated(DVec3::X, by.x).expect("a frame");
-            Part::new(
+            Part::revolved(
                 name.into(),
                 1,
                 Arc::new(region),
