@@ -389,7 +389,11 @@ fn caps_share_their_edges_with_the_sides_and_lie_in_their_planes() {
         "angle = 90",
     );
     assert!(matches!(
-        quarter.assembly().parts()[0].body().revolved().expect("turned").turn(),
+        quarter.assembly().parts()[0]
+            .body()
+            .revolved()
+            .expect("turned")
+            .turn(),
         Turn::Partial(_)
     ));
     let mesh = only(&quarter, 1e-3);

@@ -3,15 +3,19 @@
 use super::error::SceneError;
 use super::model::{
     self, AxisModel, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel,
-    SolidKind, SolidModel,
+    SolidKind, SolidModel, TurnModel,
 };
+use super::shapes;
 use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
 use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region, RegionError};
-use crate::solid::{Analytic, Assembly, Measures, Operation, Part, Turn};
+use crate::solid::{
+    Analytic, Assembly, Block, Body, Ellipsoid, Measures, Operation, Part, Shape, Turn,
+};
 use glam::DVec3;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
@@ -80,29 +84,41 @@ impl Scene {
         let mut warnings = Vec::new();
         let mut parts = Vec::new();
         for solid in &model.solids {
-            let SolidKind::Revolve { profile, .. } = &solid.kind;
-            let region = if let Some(region) = regions.get(profile) {
-                region.clone()
-            } else {
-                let (name, data) = &model.profiles[*profile];
-                let region = region(data).map_err(|e| placed(&model, data, &e))?;
-                warnings.extend(
-                    region
-                        .warnings()
-                        .iter()
-                        .map(|w| format!("profiles.{name}: {w}")),
-                );
-                let region = Arc::new(region);
-                regions.insert(*profile, region.clone());
-                region
+            let part = match &solid.kind {
+                SolidKind::Revolve { profile, turn } => {
+                    let (name, data) = &model.profiles[*profile];
+                    let region = match regions.entry(*profile) {
+                        Entry::Occupied(known) => known.get().clone(),
+                        Entry::Vacant(place) => {
+                            let region = region(data).map_err(|e| placed(&model, data, &e))?;
+                            let said = region.warnings().iter();
+                            warnings.extend(said.map(|w| format!("profiles.{name}: {w}")));
+                            place.insert(Arc::new(region)).clone()
+                        }
+                    };
+                    turned(&model, solid, region, *turn)?
+                }
+                SolidKind::Round { shape, turn } => {
+                    turned(&model, solid, round(&model, solid, *shape)?, *turn)?
+                }
+                SolidKind::Ellipsoid { radii } => {
+                    let frame = frame(&model, &solid.axis, &solid.steps, &solid.path)?;
+                    let made = Ellipsoid::new(&frame, DVec3::from(*radii));
+                    let body = made.ok_or_else(|| unmade(&model, solid))?;
+                    Part::new(solid.name.clone(), solid.material, Body::Ellipsoid(body))
+                }
+                SolidKind::Box { size } => {
+                    let frame = frame(&model, &solid.axis, &solid.steps, &solid.path)?;
+                    let body = Body::Block(Block::new(&frame, DVec3::from(*size)));
+                    Part::new(solid.name.clone(), solid.material, body)
+                }
             };
-            parts.push(
-                part(&model, solid, region)?.with_operation(match solid.operation {
-                    model::Operation::Add => Operation::Add,
-                    model::Operation::Subtract => Operation::Subtract,
-                    model::Operation::Intersect => Operation::Intersect,
-                }),
-            );
+            check_size(&model, solid, &part)?;
+            parts.push(part.with_operation(match solid.operation {
+                model::Operation::Add => Operation::Add,
+                model::Operation::Subtract => Operation::Subtract,
+                model::Operation::Intersect => Operation::Intersect,
+            }));
         }
         let reference = model.reference.as_ref().map(|r| {
             let frame = frame(&model, &r.axis, &r.steps, "reference")?;
@@ -449,37 +465,51 @@ fn placed(model: &SceneModel, profile: &ProfileModel, error: &RegionError) -> Sc
     model.error(place, &path, Some(found), &wanted, hint)
 }
 
-fn part(model: &SceneModel, solid: &SolidModel, region: Arc<Region>) -> Result<Part, Error> {
-    let SolidKind::Revolve {
-        angle, start, axis, ..
-    } = &solid.kind;
-    let frame = frame(model, axis, &solid.steps, &solid.path)?;
-    let part = Part::revolved(
+fn turned(
+    model: &SceneModel,
+    solid: &SolidModel,
+    region: Arc<Region>,
+    turn: TurnModel,
+) -> Result<Part, Error> {
+    let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
+    Ok(Part::revolved(
         solid.name.clone(),
         solid.material,
         region,
         &frame,
-        Turn::new(*start, *angle),
-    );
+        Turn::new(turn.start, turn.angle),
+    ))
+}
+
+/// The region that makes a round shape when it is turned.
+fn round(model: &SceneModel, solid: &SolidModel, shape: Shape) -> Result<Arc<Region>, Error> {
+    let region = shapes::region(shape).map_err(|_| unmade(model, solid))?;
+    Ok(Arc::new(region))
+}
+
+fn unmade(model: &SceneModel, solid: &SolidModel) -> Error {
+    let found = Some("sizes that enclose nothing".to_owned());
+    let wanted = "sizes that are not too far from each other";
+    let error = model.error(solid.place, &solid.path, found, wanted, None);
+    error.into()
+}
+
+/// Refuses a solid whose size leaves the range in which volumes can be computed.
+fn check_size(model: &SceneModel, solid: &SolidModel, part: &Part) -> Result<(), Error> {
     let bounds = part.bounds();
     let size = bounds.longest_side();
-    if !(bounds.min.is_finite()
+    if bounds.min.is_finite()
         && bounds.max.is_finite()
         && size > 0.0
-        && (1e-120..1e120).contains(&size))
+        && (1e-120..1e120).contains(&size)
     {
-        let found = format!("a solid of size {size:e}");
-        return Err(model
-            .error(
-                solid.place,
-                &solid.path,
-                Some(found),
-                "a size between 1e-120 and 1e120",
-                Some("change place.scale or the units".into()),
-            )
-            .into());
+        return Ok(());
     }
-    Ok(part)
+    let found = format!("a solid of size {size:e}");
+    let wanted = "a size between 1e-120 and 1e120";
+    let hint = "change place.scale or the units".to_owned();
+    let error = model.error(solid.place, &solid.path, Some(found), wanted, Some(hint));
+    Err(error.into())
 }
 
 /// The frame of something about an axis, placed.

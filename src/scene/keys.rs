@@ -42,7 +42,7 @@ pub(super) const INTERPOLATE: &[&str] = &["kind", "reverse", "points", "degree"]
 /// `points` from a file.
 pub(super) const POINTS_FILE: &[&str] = &["file"];
 /// `[[solid]]` of kind `revolve`.
-pub(super) const SOLID: &[&str] = &[
+pub(super) const REVOLVE: &[&str] = &[
     "name",
     "kind",
     "profile",
@@ -53,6 +53,99 @@ pub(super) const SOLID: &[&str] = &[
     "operation",
     "material",
 ];
+/// `[[solid]]` of kind `torus`.
+pub(super) const TORUS: &[&str] = &[
+    "name",
+    "kind",
+    "major",
+    "minor",
+    "angle",
+    "start",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// `[[solid]]` of kind `cylinder`.
+pub(super) const CYLINDER: &[&str] = &[
+    "name",
+    "kind",
+    "radius",
+    "height",
+    "angle",
+    "start",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// `[[solid]]` of kind `cone`.
+pub(super) const CONE: &[&str] = &[
+    "name",
+    "kind",
+    "radius1",
+    "radius2",
+    "height",
+    "angle",
+    "start",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// `[[solid]]` of kind `sphere`.
+pub(super) const SPHERE: &[&str] = &[
+    "name",
+    "kind",
+    "radius",
+    "angle",
+    "start",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// `[[solid]]` of kind `ellipsoid`.
+pub(super) const ELLIPSOID: &[&str] = &[
+    "name",
+    "kind",
+    "radii",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// `[[solid]]` of kind `box`.
+pub(super) const BOX: &[&str] = &[
+    "name",
+    "kind",
+    "size",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// `[[solid]]` of kind `volume`.
+pub(super) const VOLUME: &[&str] = &[
+    "name",
+    "kind",
+    "patches",
+    "construct",
+    "file",
+    "profile",
+    "section",
+    "angle",
+    "start",
+    "fill",
+    "axis",
+    "place",
+    "operation",
+    "material",
+];
+/// One of `patches`.
+pub(super) const PATCH: &[&str] = &["degrees", "knots", "points", "weights", "fields"];
+/// `section` of a construction.
+pub(super) const SECTION: &[&str] = &["degrees", "knots", "points", "weights"];
 /// `solid.axis`.
 pub(super) const AXIS: &[&str] = &["origin", "direction", "x"];
 /// One step of `solid.place`.
@@ -70,7 +163,16 @@ pub(super) const CURVES: &[(&str, &[&str])] = &[
     ("interpolate", INTERPOLATE),
 ];
 /// Kinds of solids with the keys of each.
-pub(super) const SOLIDS: &[(&str, &[&str])] = &[("revolve", SOLID)];
+pub(super) const SOLIDS: &[(&str, &[&str])] = &[
+    ("revolve", REVOLVE),
+    ("torus", TORUS),
+    ("cylinder", CYLINDER),
+    ("cone", CONE),
+    ("sphere", SPHERE),
+    ("ellipsoid", ELLIPSOID),
+    ("box", BOX),
+    ("volume", VOLUME),
+];
 
 /// Kinds of closed forms with the keys of each.
 pub(super) const REFERENCES: &[(&str, &[&str])] = &[

@@ -40,6 +40,10 @@ pub const MAX_VOXELS: u32 = i32::MAX as u32;
 /// after projecting has fewer than seven digits.
 pub const MIN_SINE: f64 = 1e-9;
 
+/// Least length of an ellipsoid or a box as a share of its largest: squares of the quotient keep half of
+/// their digits.
+pub const MIN_ASPECT: f64 = 1e-8;
+
 /// Characters of the name of a scene, profile, solid or material: names go into file headers.
 pub const MAX_NAME: usize = 255;
 

@@ -33,7 +33,9 @@ mod reference;
 mod resolve;
 mod schema;
 mod set;
+mod shapes;
 mod solid;
+mod volume;
 #[cfg(test)]
 mod tests;
 mod value;
@@ -43,13 +45,14 @@ pub use error::{InputProblem, Place, SceneError, Sources};
 #[cfg(feature = "cli")]
 pub(crate) use keys::nearest;
 pub use limits::{
-    MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME, MAX_TEXT_BYTES, MAX_VOXELS,
+    MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME, MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT,
     MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
-    AxisModel, Boundary, ChannelName, CompressionName, CurveKind, CurveModel, Fill, FormatName,
+    AxisModel, Boundary, ChannelName, CompressionName, CurveForm, CurveKind, CurveModel, FieldModel,
+    Fill, FormatName, PatchModel, SectionModel, VolumeModel, VolumeSource,
     GridModel, GridStep, Operation, OutputModel, PlaceStep, PointModel, ProfileModel, SceneModel,
-    SolidKind, SolidModel, Units,
+    SolidKind, SolidModel, TurnModel, Units,
 };
 pub use schema::json_schema;
 

@@ -336,6 +336,8 @@ pub struct SolidModel {
     pub name: String,
     /// What it is made from.
     pub kind: SolidKind,
+    /// Its axis: what is turned is turned about it, the rest is centred at its origin.
+    pub axis: AxisModel,
     /// Steps that place it, first to last.
     pub steps: Vec<PlaceStep>,
     /// What it does to what the solids before it have made.
@@ -356,13 +358,127 @@ pub enum SolidKind {
     Revolve {
         /// Index of the profile in [`SceneModel::profiles`].
         profile: usize,
-        /// Angle turned in degrees, above 0 and at most 360.
-        angle: f64,
-        /// Angle at which the turn starts, in degrees.
-        start: f64,
-        /// The axis.
-        axis: AxisModel,
+        /// How far, and from where.
+        turn: TurnModel,
     },
+    /// A torus, cylinder, cone or sphere; cylinder and cone rise from the axis's origin.
+    Round {
+        /// Which, and its sizes. A torus may have a minor radius above the major one.
+        shape: Shape,
+        /// How far it is turned, and from where.
+        turn: TurnModel,
+    },
+    /// An ellipsoid about the axis's origin.
+    Ellipsoid {
+        /// Half axes along the zero-angle direction, across it and along the axis.
+        radii: [f64; 3],
+    },
+    /// A rectangular block about the axis's origin.
+    Box {
+        /// Side lengths along the zero-angle direction, across it and along the axis.
+        size: [f64; 3],
+    },
+    /// Trivariate NURBS.
+    Volume(VolumeModel),
+}
+
+/// A solid made of trivariate NURBS.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct VolumeModel {
+    /// Where the nets come from.
+    pub source: VolumeSource,
+    /// What reading a file of them had to assume.
+    pub notes: Vec<String>,
+}
+
+/// Where the nets of a volume come from.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum VolumeSource {
+    /// Given, inline or in a file.
+    Patches(Vec<PatchModel>),
+    /// The chain of a profile, joined to the axis and turned.
+    Curve {
+        /// Which construction.
+        form: CurveForm,
+        /// Index of the profile in [`SceneModel::profiles`].
+        profile: usize,
+        /// How far, and from where.
+        turn: TurnModel,
+        /// Whether chains that run back along the axis are taken as their stack of discs.
+        union: bool,
+    },
+    /// A surface of the half-plane, turned.
+    Section {
+        /// The surface.
+        section: SectionModel,
+        /// How far, and from where.
+        turn: TurnModel,
+    },
+}
+
+/// How a chain becomes a volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CurveForm {
+    /// Construction a: the curve times a disc.
+    Disc,
+    /// Construction c: the curve joined to the axis by radial lines, times a circle.
+    Ruled,
+}
+
+/// A trivariate NURBS.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct PatchModel {
+    /// Degrees in u, v and w.
+    pub degrees: [usize; 3],
+    /// Knot vectors in u, v and w.
+    pub knots: [Vec<f64>; 3],
+    /// Control points, the index of u fastest.
+    pub points: Vec<[f64; 3]>,
+    /// One for each point.
+    pub weights: Vec<f64>,
+    /// Scalars over the same basis, in the order of their names.
+    pub fields: Vec<FieldModel>,
+    /// The table.
+    pub place: Place,
+}
+
+/// A scalar of a patch.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct FieldModel {
+    /// Its name, which its channel bears.
+    pub name: String,
+    /// A value for each control point.
+    pub values: Vec<f64>,
+}
+
+/// A planar NURBS surface in the half-plane.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct SectionModel {
+    /// Degrees in u and v.
+    pub degrees: [usize; 2],
+    /// Knot vectors in u and v.
+    pub knots: [Vec<f64>; 2],
+    /// Control points (r, z), the index of u fastest.
+    pub points: Vec<[f64; 2]>,
+    /// One for each point.
+    pub weights: Vec<f64>,
+    /// The table.
+    pub place: Place,
+}
+
+/// Part of a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct TurnModel {
+    /// Angle turned in degrees, above 0 and at most 360.
+    pub angle: f64,
+    /// Angle at which the turn starts, in degrees.
+    pub start: f64,
 }
 
 /// A closed form to compare with: `[reference]`.

@@ -1,4 +1,4 @@
-//! Points in a file of their own: `points = { file = "wall.csv" }`.
+//! Files that a scene names: points of a curve, `points = { file = "wall.csv" }`, and texts of splines.
 //!
 //! One point on a line: r, z and optionally the weight, with a comma or blanks between. What follows
 //! `#` is a comment; empty lines mean nothing.
@@ -39,13 +39,26 @@ impl PointFiles {
         }
     }
 
-    /// Reads `file`, which the scene names at `place`, and adds its text to `sources`.
+    /// Reads the points of `file`, which the scene names at `place`, and adds its text to `sources`.
     pub(super) fn read(
         &mut self,
         file: &str,
         place: Place,
         sources: &mut Sources,
     ) -> Result<FilePoints, Fault> {
+        let (source, text) = self.text(file, place, sources)?;
+        let points = parse(&text, source, self.points_left)?;
+        self.points_left -= points.points.len();
+        Ok(points)
+    }
+
+    /// Reads the text of `file` and adds it to `sources`, where it gets a number.
+    pub(super) fn text(
+        &mut self,
+        file: &str,
+        place: Place,
+        sources: &mut Sources,
+    ) -> Result<(u32, String), Fault> {
         let path = self.base_dir.join(file);
         let shown = path.display().to_string();
         let unreadable = |error| Fault::read(place, shown.clone(), error);
@@ -65,7 +78,7 @@ impl PointFiles {
         if bytes.len() > self.bytes_left {
             return Err(Fault::value(
                 place,
-                format!("point files of at most {MAX_TEXT_BYTES} bytes, all together"),
+                format!("files of at most {MAX_TEXT_BYTES} bytes, all together"),
             ));
         }
         self.bytes_left -= bytes.len();
@@ -83,9 +96,7 @@ impl PointFiles {
             }
         };
         let source = sources.add(shown, text.as_str().into(), false);
-        let points = parse(&text, source, self.points_left)?;
-        self.points_left -= points.points.len();
-        Ok(points)
+        Ok((source, text))
     }
 }
 

@@ -290,7 +290,8 @@ fn weights(fields: &Fields<'_>, count: usize, from_file: FileWeights) -> Result<
         .unwrap_or_else(|| vec![1.0; count]))
 }
 
-fn knots(value: &Value, points: usize, degree: usize) -> Result<Vec<f64>, Fault> {
+/// A knot vector for that many points.
+pub(super) fn knots(value: &Value, points: usize, degree: usize) -> Result<Vec<f64>, Fault> {
     let list = elements(value, "an array of numbers")?;
     let needed = points + degree + 1;
     if list.len() != needed {

@@ -17,6 +17,7 @@ use super::profile::profile;
 use super::reference::reference;
 use super::solid::solids;
 use super::value::{Kind, Value};
+use super::volume::Context;
 
 /// Reads a scene. Point files are added to `sources`.
 pub(super) fn scene(
@@ -75,7 +76,12 @@ pub(super) fn scene(
         })?
         .unwrap_or_default();
     let solids = fields.need("solid", "at least one [[solid]]", |value| {
-        solids(value, &profiles, sources)
+        let mut context = Context {
+            profiles: &profiles,
+            files,
+            sources,
+        };
+        solids(value, &mut context)
     })?;
     let reference = fields.read("reference", reference)?;
     Ok(SceneModel {

@@ -1,7 +1,7 @@
 //! `[reference]`: the closed form that a scene is compared with.
 
 use super::error::Fault;
-use super::fields::{kinded, length, number};
+use super::fields::{Fields, kinded, length, number};
 use super::keys;
 use super::limits::MIN_MAGNITUDE;
 use super::model::ReferenceModel;
@@ -12,6 +12,25 @@ use crate::solid::Shape;
 /// Reads `reference`.
 pub(super) fn reference(value: &Value) -> Result<ReferenceModel, Fault> {
     let (kind, fields) = kinded(value, keys::REFERENCES, "a table: a closed form")?;
+    let shape = shape(kind, &fields, value)?;
+    if let Shape::Torus { major, minor } = shape
+        && minor > major
+    {
+        let place = fields.get("minor").map_or(value.place, |v| v.place);
+        let wanted = "a minor radius of at most the major one";
+        return Err(Fault::value(place, wanted).at_key("minor"));
+    }
+    let (axis, steps) = placed(&fields, value.place)?;
+    Ok(ReferenceModel {
+        shape,
+        axis,
+        steps,
+        place: value.place,
+    })
+}
+
+/// The sizes of a torus, cylinder, cone or (any other kind) sphere.
+pub(super) fn shape(kind: &str, fields: &Fields, value: &Value) -> Result<Shape, Fault> {
     let size = |key: &str| fields.need(key, "a length", length);
     let radius_or_tip = |key: &str| {
         fields.need(key, "a radius", |value| {
@@ -19,16 +38,11 @@ pub(super) fn reference(value: &Value) -> Result<ReferenceModel, Fault> {
             number(value, wanted, |x| x == 0.0 || x >= MIN_MAGNITUDE)
         })
     };
-    let shape = match kind {
-        "torus" => {
-            let (major, minor) = (size("major")?, size("minor")?);
-            if minor > major {
-                let place = fields.get("minor").map_or(value.place, |v| v.place);
-                let wanted = "a minor radius of at most the major one";
-                return Err(Fault::value(place, wanted).at_key("minor"));
-            }
-            Shape::Torus { major, minor }
-        }
+    Ok(match kind {
+        "torus" => Shape::Torus {
+            major: size("major")?,
+            minor: size("minor")?,
+        },
         "cylinder" => Shape::Cylinder {
             radius: size("radius")?,
             height: size("height")?,
@@ -49,12 +63,5 @@ pub(super) fn reference(value: &Value) -> Result<ReferenceModel, Fault> {
         _ => Shape::Sphere {
             radius: size("radius")?,
         },
-    };
-    let (axis, steps) = placed(&fields, value.place)?;
-    Ok(ReferenceModel {
-        shape,
-        axis,
-        steps,
-        place: value.place,
     })
 }

@@ -7,8 +7,8 @@
 use serde_json::{Map, Value, json};
 
 use super::model::{
-    AxisModel, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PlaceStep, PointModel,
-    ProfileModel, ReferenceModel, SceneModel, SolidKind, SolidModel,
+    AxisModel, CurveForm, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PlaceStep, PointModel,
+    ProfileModel, ReferenceModel, SceneModel, SolidKind, SolidModel, TurnModel, PatchModel, VolumeModel, VolumeSource,
 };
 use crate::solid::Shape;
 
@@ -46,24 +46,103 @@ impl SceneModel {
     }
 
     fn solid(&self, model: &SolidModel) -> Value {
-        let SolidKind::Revolve {
-            profile,
-            angle,
-            start,
-            axis,
-        } = &model.kind;
-        object([
+        let mut keys = vec![
             ("name", json!(model.name)),
-            ("kind", json!("revolve")),
-            ("profile", json!(self.profiles[*profile].0)),
-            ("angle", json!(angle)),
-            ("start", json!(start)),
-            ("axis", self::axis(axis)),
+            ("axis", axis(&model.axis)),
             ("place", model.steps.iter().map(step).collect()),
             ("operation", json!(model.operation.name())),
             ("material", json!(model.material)),
-        ])
+        ];
+        let turned =
+            |turn: &TurnModel| [("angle", json!(turn.angle)), ("start", json!(turn.start))];
+        match &model.kind {
+            SolidKind::Revolve { profile, turn } => {
+                keys.push(("kind", json!("revolve")));
+                keys.push(("profile", json!(self.profiles[*profile].0)));
+                keys.extend(turned(turn));
+            }
+            SolidKind::Round { shape, turn } => {
+                keys.extend(round(*shape));
+                keys.extend(turned(turn));
+            }
+            SolidKind::Ellipsoid { radii } => {
+                keys.push(("kind", json!("ellipsoid")));
+                keys.push(("radii", json!(radii)));
+            }
+            SolidKind::Box { size } => {
+                keys.push(("kind", json!("box")));
+                keys.push(("size", json!(size)));
+            }
+            SolidKind::Volume(volume) => {
+                keys.push(("kind", json!("volume")));
+                keys.extend(self.volume(volume));
+            }
+        }
+        sorted(keys.into_iter().map(|(key, value)| (key.to_owned(), value)))
     }
+}
+
+impl SceneModel {
+    fn volume(&self, model: &VolumeModel) -> Vec<(&'static str, Value)> {
+        match &model.source {
+            VolumeSource::Patches(patches) => {
+                vec![("patches", patches.iter().map(patch).collect())]
+            }
+            VolumeSource::Curve {
+                form,
+                profile,
+                turn,
+                union,
+            } => {
+                let construct = match form {
+                    CurveForm::Disc => "curve-disc",
+                    CurveForm::Ruled => "curve-ruled",
+                };
+                let mut keys = vec![
+                    ("construct", json!(construct)),
+                    ("profile", json!(self.profiles[*profile].0)),
+                ];
+                keys.extend(turned(turn));
+                keys.extend(union.then(|| ("fill", json!("union"))));
+                keys
+            }
+            VolumeSource::Section { section, turn } => {
+                let mut keys = vec![
+                    ("construct", json!("surface-circle")),
+                    (
+                        "section",
+                        object([
+                            ("degrees", json!(section.degrees)),
+                            ("knots", json!(section.knots)),
+                            ("points", json!(section.points)),
+                            ("weights", json!(section.weights)),
+                        ]),
+                    ),
+                ];
+                keys.extend(turned(turn));
+                keys
+            }
+        }
+    }
+}
+
+fn turned(turn: &TurnModel) -> [(&'static str, Value); 2] {
+    [("angle", json!(turn.angle)), ("start", json!(turn.start))]
+}
+
+fn patch(model: &PatchModel) -> Value {
+    let fields = model.fields.iter();
+    let fields = match model.fields.as_slice() {
+        [] => Value::Null,
+        _ => sorted(fields.map(|f| (f.name.clone(), json!(f.values)))),
+    };
+    object([
+        ("degrees", json!(model.degrees)),
+        ("knots", json!(model.knots)),
+        ("points", json!(model.points)),
+        ("weights", json!(model.weights)),
+        ("fields", fields),
+    ])
 }
 
 /// An object whose keys are in alphabetical order, whichever map `serde_json` was built with.
@@ -204,14 +283,20 @@ fn curve(model: &CurveModel) -> Value {
 }
 
 fn reference(model: &ReferenceModel) -> Value {
-    let mut keys = match model.shape {
-        Shape::Torus { major, minor } => {
-            vec![
-                ("kind", json!("torus")),
-                ("major", json!(major)),
-                ("minor", json!(minor)),
-            ]
-        }
+    let mut keys = round(model.shape);
+    keys.push(("axis", axis(&model.axis)));
+    keys.push(("place", model.steps.iter().map(step).collect()));
+    sorted(keys.into_iter().map(|(key, value)| (key.to_owned(), value)))
+}
+
+/// Kind and sizes of a shape.
+fn round(shape: Shape) -> Vec<(&'static str, Value)> {
+    match shape {
+        Shape::Torus { major, minor } => vec![
+            ("kind", json!("torus")),
+            ("major", json!(major)),
+            ("minor", json!(minor)),
+        ],
         Shape::Cylinder { radius, height } => vec![
             ("kind", json!("cylinder")),
             ("radius", json!(radius)),
@@ -228,10 +313,7 @@ fn reference(model: &ReferenceModel) -> Value {
             ("height", json!(height)),
         ],
         Shape::Sphere { radius } => vec![("kind", json!("sphere")), ("radius", json!(radius))],
-    };
-    keys.push(("axis", axis(&model.axis)));
-    keys.push(("place", model.steps.iter().map(step).collect()));
-    sorted(keys.into_iter().map(|(key, value)| (key.to_owned(), value)))
+    }
 }
 
 fn axis(model: &AxisModel) -> Value {

@@ -523,12 +523,7 @@ fn reference() -> Value {
             "kind" => json!({ "const": kind, "description": "Kind of shape." }),
             "axis" => axis(),
             "place" => place(),
-            "radius1" | "radius2" => json!({
-                "description": "Radius at the bottom, and at the top; one may be 0.",
-                "type": "number",
-                "minimum": 0,
-                "maximum": MAX_MAGNITUDE,
-            }),
+            "radius1" | "radius2" => radius_or_tip(),
             _ => length("A length."),
         };
         let properties: Map<String, Value> = keys
@@ -551,54 +546,152 @@ fn reference() -> Value {
 }
 
 fn solid() -> Value {
-    object(
-        "A solid: a profile turned about an axis.",
-        &["kind", "profile"],
-        [
-            (
-                "name",
-                name("Name, unique in the scene; by default kind and number."),
-            ),
-            (
-                "kind",
-                json!({ "const": "revolve", "description": "Kind of solid." }),
-            ),
-            (
-                "profile",
-                json!({ "description": "Name of the profile.", "type": "string" }),
-            ),
-            (
-                "angle",
-                json!({
-                    "description": "Degrees turned; flat caps close a partial turn.",
-                    "type": "number",
-                    "minimum": MIN_MAGNITUDE,
-                    "maximum": 360,
-                    "default": 360,
-                }),
-            ),
-            (
-                "start",
-                with_default(number("Degrees where the turn starts."), json!(0)),
-            ),
-            ("axis", axis()),
-            ("place", place()),
-            (
-                "operation",
-                with_default(
-                    names(
-                        "What it does to what the solids before it have made; the first can only add.",
-                        Operation::ALL.iter().map(|n| n.name()),
-                    ),
-                    json!("add"),
-                ),
-            ),
-            (
-                "material",
-                with_default(integer("Material id.", 1, u32::MAX), json!(1)),
-            ),
-        ],
+    choice(
+        "A solid; its kind decides its keys.",
+        super::keys::SOLIDS
+            .iter()
+            .map(|(kind, keys)| solid_kind(kind, keys))
+            .collect(),
     )
+}
+
+fn solid_kind(kind: &str, keys: &[&str]) -> Value {
+    let properties: Map<String, Value> = keys
+        .iter()
+        .map(|&key| (key.to_owned(), solid_property(kind, key)))
+        .collect();
+    let optional = [
+        "name",
+        "angle",
+        "start",
+        "axis",
+        "place",
+        "operation",
+        "material",
+    ];
+    json!({
+        "description": match kind {
+            "revolve" => "A profile turned about an axis.",
+            "torus" => "A torus about the origin of its axis.",
+            "cylinder" => "A cylinder that rises from the origin of its axis.",
+            "cone" => "A cone or frustum that rises from the origin of its axis.",
+            "sphere" => "A ball about the origin of its axis.",
+            "volume" => {
+                "A trivariate NURBS: one of patches, construct and file; construct takes a profile or a section."
+            }
+            "ellipsoid" => "An ellipsoid about the origin of its axis.",
+            _ => "A rectangular block about the origin of its axis.",
+        },
+        "type": "object",
+        "properties": properties,
+        "required": required.collect::<Vec<_>>(),
+        "additionalProperties": false,
+    })
+}
+
+fn solid_property(kind: &str, key: &str) -> Value {
+    match key {
+        "name" => name("Name, unique in the scene; by default kind and number."),
+        "kind" => json!({ "const": kind, "description": "Kind of solid." }),
+        "profile" => json!({ "description": "Name of the profile.", "type": "string" }),
+        "angle" => json!({
+            "description": "Degrees turned; flat caps close a partial turn.",
+            "type": "number",
+            "minimum": MIN_MAGNITUDE,
+            "maximum": 360,
+            "default": 360,
+        }),
+        "start" => with_default(number("Degrees where the turn starts."), json!(0)),
+        "axis" => axis(),
+        "place" => place(),
+        "operation" => with_default(
+            names(
+                "What it does to what the solids before it have made; the first can only add.",
+                Operation::ALL.iter().map(|n| n.name()),
+            ),
+            json!("add"),
+        ),
+        "material" => with_default(integer("Material id.", 1, u32::MAX), json!(1)),
+        "radii" => tuple(
+            "Half axes along the zero-angle direction, across it and along the axis.",
+            3,
+            length("A half axis."),
+        ),
+        "size" => tuple(
+            "Side lengths along the zero-angle direction, across it and along the axis.",
+            3,
+            length("A side length."),
+        ),
+        "radius1" | "radius2" => radius_or_tip(),
+        "patches" => array("Trivariate NURBS.", 1, patch()),
+        "construct" => names(
+            "How a profile's chain or a section becomes a volume.",
+            ["curve-disc", "surface-circle", "curve-ruled"].into_iter(),
+        ),
+        "file" => json!({
+            "description": "A file of volumes: .g2, .mesh (MFEM), .json (geomdl) or .xml (G+Smo).",
+            "type": "string",
+        }),
+        "section" => net("A planar NURBS surface in the half-plane.", 2, false),
+        "fill" => names(
+            "Take a chain that runs back along the axis as its stack of discs.",
+            ["union"].into_iter(),
+        ),
+        "major" => length("Radius of the circle that the tube's centre runs along."),
+        "minor" => length("Radius of the tube."),
+        "height" => length("Height along the axis."),
+        _ => length("Radius."),
+    }
+}
+
+fn patch() -> Value {
+    net("A trivariate NURBS.", 3, true)
+}
+
+/// A net of control points over `count` parameters, in as many coordinates.
+fn net(description: &str, count: usize, fields: bool) -> Value {
+    let degree = integer("A degree.", 1, MAX_DEGREE as u32);
+    let knots = array("A knot vector.", 4, number("A knot."));
+    let point = tuple("A control point.", count, number("A coordinate."));
+    let mut properties = vec![
+        ("degrees", tuple("A degree for each parameter.", count, degree)),
+        ("knots", tuple("A knot vector for each parameter.", count, knots)),
+        ("points", array("Control points, the first index fastest.", 4, point)),
+        (
+            "weights",
+            array("A weight for each control point; by default 1.", 4, length("A weight.")),
+        ),
+    ];
+    if fields {
+        properties.push((
+            "fields",
+            json!({
+                "description": "Scalars over the same basis by name: a value for each control point.",
+                "type": "object",
+                "additionalProperties": array("Values.", 4, number("A value.")),
+            }),
+        ));
+    }
+    let properties: Map<String, Value> = properties
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect();
+    json!({
+        "description": description,
+        "type": "object",
+        "properties": properties,
+        "required": ["degrees", "knots", "points"],
+        "additionalProperties": false,
+    })
+}
+
+fn radius_or_tip() -> Value {
+    json!({
+        "description": "Radius at the bottom, and at the top; one may be 0.",
+        "type": "number",
+        "minimum": 0,
+        "maximum": MAX_MAGNITUDE,
+    })
 }
 
 #[cfg(test)]
@@ -639,13 +732,16 @@ mod tests {
             &curves[0]["properties"]["points"]["oneOf"][1],
             keys::POINTS_FILE,
         );
-        let solid = &schema["$defs"]["solid"];
-        assert_eq!(keys::SOLIDS.len(), 1);
-        assert_eq!(
-            solid["properties"]["kind"]["const"],
-            json!(keys::SOLIDS[0].0)
-        );
-        check(solid, keys::SOLIDS[0].1);
+        let solids = schema["$defs"]["solid"]["oneOf"].as_array().expect("kinds");
+        assert_eq!(solids.len(), keys::SOLIDS.len());
+        for (solid, (kind, keys)) in solids.iter().zip(keys::SOLIDS) {
+            assert_eq!(solid["properties"]["kind"]["const"], json!(kind));
+            check(solid, keys);
+        }
+        let volume = &solids[solids.len() - 1]["properties"];
+        check(&volume["patches"]["items"], keys::PATCH);
+        check(&volume["section"], keys::SECTION);
+        let solid = &solids[0];
         let references = schema["properties"]["reference"]["oneOf"]
             .as_array()
             .expect("kinds");

@@ -2,22 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use super::error::{Fault, Place, Sources, push_index, shorten};
+use super::error::{Fault, Place, push_index, shorten};
 use super::fields::{
     Fields, choice, choices, direction, each, elements, find, finite, integer, kinded, largest,
-    name, number, string, vector,
+    length, name, number, string, tuple, vector,
 };
 use super::keys::{self, nearest};
-use super::limits::{MIN_MAGNITUDE, MIN_SINE};
-use super::model::{AxisModel, Operation, PlaceStep, ProfileModel, SolidKind, SolidModel};
+use super::limits::{MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE};
+use super::model::{
+    AxisModel, Operation, PlaceStep, ProfileModel, SolidKind, SolidModel, TurnModel,
+};
+use super::reference::shape;
+use super::volume::{Context, volume};
 use super::value::{Kind, Value};
 
 /// Reads `solid`.
-pub(super) fn solids(
-    value: &Value,
-    profiles: &[(String, ProfileModel)],
-    sources: &Sources,
-) -> Result<Vec<SolidModel>, Fault> {
+pub(super) fn solids(value: &Value, context: &mut Context) -> Result<Vec<SolidModel>, Fault> {
     let wanted = "an array of at least one solid";
     if let Kind::Table(_) = value.kind {
         return Err(value.wrong_type(wanted).with_hint(Some(
@@ -28,7 +28,7 @@ pub(super) fn solids(
     if list.is_empty() {
         return Err(Fault::value(value.place, wanted));
     }
-    let found = each(list, |index, element| solid(element, index, profiles))?;
+    let found = each(list, |index, element| solid(element, index, context))?;
     // Of two solids of one name the later one is at fault, unless only the earlier one asked for it.
     let mut names: BTreeMap<&str, usize> = BTreeMap::new();
     let asked = |index: usize| match &list[index].kind {
@@ -44,7 +44,7 @@ pub(super) fn solids(
             None => (first, index),
         };
         let place = asked(at).unwrap_or(found[at].place);
-        let line = sources.describe_line(found[other].place);
+        let line = context.sources.describe_line(found[other].place);
         return Err(Fault::value(place, "a name that no other solid has")
             .with_hint(Some(format!("solid[{other}], {line}, has it too")))
             .at_key("name")
@@ -53,45 +53,28 @@ pub(super) fn solids(
     Ok(found)
 }
 
-fn solid(
-    value: &Value,
-    index: usize,
-    profiles: &[(String, ProfileModel)],
-) -> Result<SolidModel, Fault> {
+fn solid(value: &Value, index: usize, context: &mut Context) -> Result<SolidModel, Fault> {
     let (kind, fields) = kinded(value, keys::SOLIDS, "a table: a solid")?;
     let name = fields
         .read("name", |value| name(value, "a string"))?
         .unwrap_or_else(|| format!("{kind} {}", index + 1));
-    let profile = fields.need("profile", "the name of a profile", |value| {
-        let wanted = "the name of a profile";
-        let name = string(value, wanted)?;
-        profiles
-            .binary_search_by(|(other, _)| other.as_str().cmp(name))
-            .map_err(|_| {
-                let near = nearest(name, profiles.iter().map(|(name, _)| name.as_str()));
-                let hint = match near {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None if profiles.is_empty() => "the scene has no profiles".to_owned(),
-                    None => {
-                        let names: Vec<&str> = profiles
-                            .iter()
-                            .take(8)
-                            .map(|(name, _)| name.as_str())
-                            .collect();
-                        format!("the scene has {}", shorten(&names.join(", ")))
-                    }
-                };
-                Fault::value(value.place, wanted).with_hint(Some(hint))
-            })
-    })?;
-    let angle = fields
-        .read("angle", |value| {
-            number(value, "an angle greater than 0 and at most 360", |x| {
-                (MIN_MAGNITUDE..=360.0).contains(&x)
-            })
-        })?
-        .unwrap_or(360.0);
-    let start = fields.read("start", finite)?.unwrap_or(0.0);
+    let kind = match kind {
+        "revolve" => SolidKind::Revolve {
+            profile: profile(&fields, context.profiles)?,
+            turn: turn(&fields)?,
+        },
+        "ellipsoid" => SolidKind::Ellipsoid {
+            radii: lengths(&fields, "radii", "three half axes [x, y, z]")?,
+        },
+        "box" => SolidKind::Box {
+            size: lengths(&fields, "size", "three side lengths [x, y, z]")?,
+        },
+        "volume" => SolidKind::Volume(volume(&fields, value, context)?),
+        round => SolidKind::Round {
+            shape: shape(round, &fields, value)?,
+            turn: turn(&fields)?,
+        },
+    };
     let (axis, steps) = placed(&fields, value.place)?;
     let operation = fields
         .read("operation", |value| {
@@ -112,17 +95,65 @@ fn solid(
     push_index(&mut path, index);
     Ok(SolidModel {
         name,
-        kind: SolidKind::Revolve {
-            profile,
-            angle,
-            start,
-            axis,
-        },
+        kind,
+        axis,
         steps,
         operation,
         material,
         place: value.place,
         path,
+    })
+}
+
+/// The index of the profile that a solid names.
+pub(super) fn profile(fields: &Fields, profiles: &[(String, ProfileModel)]) -> Result<usize, Fault> {
+    fields.need("profile", "the name of a profile", |value| {
+        let wanted = "the name of a profile";
+        let name = string(value, wanted)?;
+        profiles
+            .binary_search_by(|(other, _)| other.as_str().cmp(name))
+            .map_err(|_| {
+                let near = nearest(name, profiles.iter().map(|(name, _)| name.as_str()));
+                let hint = match near {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None if profiles.is_empty() => "the scene has no profiles".to_owned(),
+                    None => {
+                        let names: Vec<&str> = profiles
+                            .iter()
+                            .take(8)
+                            .map(|(name, _)| name.as_str())
+                            .collect();
+                        format!("the scene has {}", shorten(&names.join(", ")))
+                    }
+                };
+                Fault::value(value.place, wanted).with_hint(Some(hint))
+            })
+    })
+}
+
+/// How far something is turned, and from where.
+pub(super) fn turn(fields: &Fields) -> Result<TurnModel, Fault> {
+    let angle = fields.read("angle", |value| {
+        number(value, "an angle greater than 0 and at most 360", |x| {
+            (MIN_MAGNITUDE..=360.0).contains(&x)
+        })
+    })?;
+    Ok(TurnModel {
+        angle: angle.unwrap_or(360.0),
+        start: fields.read("start", finite)?.unwrap_or(0.0),
+    })
+}
+
+/// Three lengths, none of them so small beside the largest that nothing of the solid is left.
+fn lengths(fields: &Fields, key: &str, wanted: &str) -> Result<[f64; 3], Fault> {
+    fields.need(key, wanted, |value| {
+        let found: [f64; 3] = tuple(value, wanted, length)?;
+        let least = found.iter().fold(f64::INFINITY, |m, &v| v.min(m));
+        if least < MIN_ASPECT * largest(found) {
+            let wanted = format!("lengths of which none is below {MIN_ASPECT:e} of the largest");
+            return Err(Fault::value(value.place, wanted));
+        }
+        Ok(found)
     })
 }
 

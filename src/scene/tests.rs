@@ -147,13 +147,11 @@ fn the_smallest_scene_gets_every_default() {
     assert_eq!(scene.output.band, None);
     let solid = &scene.solids[0];
     assert_eq!((solid.name.as_str(), solid.material), ("revolve 1", 1));
-    let SolidKind::Revolve {
-        profile,
-        angle,
-        start,
-        axis,
-    } = &solid.kind;
-    assert_eq!((*profile, *angle, *start), (0, 360.0, 0.0));
+    let axis = &solid.axis;
+    let SolidKind::Revolve { profile, turn } = &solid.kind else {
+        panic!("{:?}", solid.kind)
+    };
+    assert_eq!((*profile, turn.angle, turn.start), (0, 360.0, 0.0));
     assert_eq!((axis.direction, axis.x), ([0.0, 0.0, 1.0], None));
     let (name, ring) = &scene.profiles[0];
     assert_eq!((name.as_str(), ring.boundary), ("ring", Boundary::Closed));
@@ -221,7 +219,7 @@ fn every_listed_key_is_looked_at() {
         .chain(at("grid.", keys::GRID))
         .chain(at("output.", keys::OUTPUT))
         .chain(at("profiles.chain.", keys::PROFILE))
-        .chain(at("solid[0].", keys::SOLID))
+        .chain(at("solid[0].", keys::REVOLVE))
         .chain(at("solid[0].axis.", keys::AXIS))
         .chain(at("solid[0].place[0].", &keys::STEP[..1]))
         .chain(at("solid[0].place[1].", &keys::STEP[1..2]))
@@ -317,7 +315,7 @@ fn missing_keys_are_refused() {
     );
     refuses(
         &small("kind = \"revolve\"\n", "kid = \"revolve\"\n"),
-        "vase.toml:6:1: solid[0]: found no key `kind`, wanted revolve; is `kid` meant to be `kind`?",
+        "vase.toml:6:1: solid[0]: found no key `kind`, wanted one of revolve, torus, cylinder, cone, sphere, ellipsoid, box; is `kid` meant to be `kind`?",
     );
     refuses(
         &small("radius = 1\n", ""),
@@ -754,8 +752,11 @@ fn sets_change_make_and_replace() {
     assert_eq!(scene.grid.step, GridStep::Resolution(64));
     assert_eq!(scene.grid.padding, 4);
     assert_eq!(scene.materials[&3], "glass");
-    let SolidKind::Revolve { angle, axis, .. } = &scene.solids[0].kind;
-    assert_eq!((*angle, axis.direction), (180.0, [0.0, 1.0, 0.0]));
+    let solid = &scene.solids[0];
+    let SolidKind::Revolve { turn, .. } = &solid.kind else {
+        panic!("{:?}", solid.kind)
+    };
+    assert_eq!((turn.angle, solid.axis.direction), (180.0, [0.0, 1.0, 0.0]));
     let scene = with_sets(FULL, &["profiles.\"my bowl\".fill=nonzero"]).expect("valid");
     assert_eq!(scene.profiles[1].1.fill, Fill::NonZero);
 }

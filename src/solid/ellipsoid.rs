@@ -348,8 +348,7 @@ fn root(value: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         };
         for x in proposals {
             // A little to both sides, so that the bracket closes.
-            let hair = 4.0 * f64::EPSILON * high;
-            for x in [x - hair, x + hair] {
+            for x in [x * (1.0 - 4.0 * f64::EPSILON), x * (1.0 + 4.0 * f64::EPSILON)] {
                 if x > low && x < high {
                     if value(x) >= 0.0 {
                         low = x;

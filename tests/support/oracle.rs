@@ -11,7 +11,7 @@ use dashu_float::{FBig, round::mode::HalfEven};
 use glam::DVec3;
 use voxlathe::scene::{
     Boundary, CurveKind, CurveModel, Fill, Operation, PlaceStep, PointModel, ProfileModel,
-    SceneModel, SolidKind, SolidModel,
+    SceneModel, SolidKind, SolidModel, TurnModel,
 };
 
 /// A float of [`BITS`] bits.
@@ -692,13 +692,12 @@ impl Solid {
     fn new(model: &SolidModel, profiles: &[(String, ProfileModel)]) -> Self {
         let SolidKind::Revolve {
             profile,
-            angle,
-            start,
-            axis,
+            turn: TurnModel { angle, start, .. },
         } = &model.kind
         else {
             unreachable!("a solid this oracle does not know")
         };
+        let axis = &model.axis;
         let e3 = unit(&axis.direction.map(big));
         let x = axis.x.unwrap_or_else(|| {
             let steep = e3[0].clone() * e3[0].clone() >= {

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use voxlathe::scene::{
     Boundary, CurveKind, CurveModel, Fill, Operation, PlaceStep, PointModel, SceneModel, SolidKind,
+    TurnModel,
 };
 
 /// The scene with every length multiplied by `scale` and `steps` (items of a `place` list) appended
@@ -39,13 +40,12 @@ pub(crate) fn scene_text(model: &SceneModel, scale: f64, steps: &str) -> String 
     for solid in &model.solids {
         let SolidKind::Revolve {
             profile,
-            angle,
-            start,
-            axis,
+            turn: TurnModel { angle, start, .. },
         } = &solid.kind
         else {
             unreachable!("a solid these tests do not know")
         };
+        let axis = &solid.axis;
         let x = axis.x.map_or(String::new(), |x| format!(", x = {x:?}"));
         let mut places: Vec<String> = solid
             .steps
