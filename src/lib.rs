@@ -22,6 +22,7 @@
 //!
 //! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
 //! * [`nurbs`]: knot vectors, basis functions and their cache, curves, refinement, Bézier pieces.
+//! * [`exchange`]: curves, surfaces and volumes from and to the files of other programs.
 //! * [`region`]: a profile's curves as bi-monotone rational pieces; membership by crossings,
 //!   certified closest points, the boundary of the filled region, its moments as line integrals.
 //! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, area, centroid and inertia,
@@ -49,6 +50,7 @@
 pub mod cli;
 pub mod converge;
 pub mod error;
+pub mod exchange;
 pub mod grid;
 pub mod io;
 pub mod math;
