@@ -143,6 +143,14 @@ fn normals_point_outward_and_stay_where_tangents_vanish() {
     assert!(sphere.evaluate(-0.1, 0.0).is_err());
     assert!(sphere.evaluate(0.5, f64::INFINITY).is_err());
     assert!(torus.evaluate(f64::NAN, 0.0).is_err());
+    // A coordinate beyond f64 is an error, not an infinity or a NaN.
+    let needle = EllipticCone::new([1e-140, 1e140], 1.0, true, frame).expect("a cone");
+    assert!(needle.evaluate(1e100, 0.0).is_err());
+    assert!(
+        Plane::new(frame)
+            .evaluate(f64::MAX, f64::MAX)
+            .is_err_and(|e| e.to_string().contains("f64"))
+    );
     assert!(Sphere::new(-1.0, frame).is_err());
     assert!(Torus::new(f64::NAN, 1.0, frame).is_err());
     assert!(EllipticCone::new([1.0, 1.0], 1.6, true, frame).is_err());

@@ -173,14 +173,19 @@ impl AxisFrame {
     /// World coordinates of a local point.
     #[must_use]
     pub fn to_world(&self, local: [f64; 3]) -> [f64; 3] {
-        self.place(local.map(Dd::of))
+        finite_or(self.place(local.map(Dd::of)), || {
+            let turned = self.turned_plain(local);
+            std::array::from_fn(|i| self.origin[i].f64() + self.scale() * turned[i])
+        })
     }
 
     /// A local vector in world coordinates: turned and scaled, not moved.
     #[must_use]
     pub fn vector_to_world(&self, local: [f64; 3]) -> [f64; 3] {
         let turned = self.turned(local.map(Dd::of));
-        turned.map(|c| (c * self.scale).f64())
+        finite_or(turned.map(|c| (c * self.scale).f64()), || {
+            self.turned_plain(local).map(|c| self.scale() * c)
+        })
     }
 
     /// A local direction in world coordinates: turned only, so that unit vectors stay unit vectors.
@@ -193,7 +198,11 @@ impl AxisFrame {
     #[must_use]
     pub fn to_local(&self, world: [f64; 3]) -> [f64; 3] {
         let d: DdVec = std::array::from_fn(|i| Dd::of(world[i]) - self.origin[i]);
-        self.axes.map(|axis| (dot(axis, d) / self.scale).f64())
+        let exact = self.axes.map(|axis| (dot(axis, d) / self.scale).f64());
+        finite_or(exact, || {
+            let d = DVec3::from_array(world) - DVec3::from_array(self.origin());
+            [0, 1, 2].map(|i| DVec3::from_array(self.axis(i)).dot(d) / self.scale())
+        })
     }
 
     /// A curve given in world coordinates, in those of the frame: what the constructions take.
@@ -230,6 +239,11 @@ impl AxisFrame {
         std::array::from_fn(|i| (self.origin[i] + self.scale * turned[i]).f64())
     }
 
+    fn turned_plain(&self, v: [f64; 3]) -> [f64; 3] {
+        let [e1, e2, e3] = [0, 1, 2].map(|i| self.axis(i));
+        std::array::from_fn(|i| e1[i] * v[0] + e2[i] * v[1] + e3[i] * v[2])
+    }
+
     fn turned(&self, v: DdVec) -> DdVec {
         let [e1, e2, e3] = self.axes;
         std::array::from_fn(|i| e1[i] * v[0] + e2[i] * v[1] + e3[i] * v[2])
@@ -243,6 +257,15 @@ impl From<&Similarity> for AxisFrame {
             axes: [0, 1, 2].map(|i| similarity.axis_exact(i)),
             scale: similarity.scale_exact(),
         }
+    }
+}
+
+/// The exact image, or where double-double has left its range, which is 2^27 less than that of f64, the plain one.
+fn finite_or(exact: [f64; 3], plain: impl Fn() -> [f64; 3]) -> [f64; 3] {
+    if exact.iter().all(|c| c.is_finite()) {
+        exact
+    } else {
+        plain()
     }
 }
 
@@ -362,6 +385,20 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn coordinates_near_the_end_of_the_range_stay_numbers() {
+        let frame = AxisFrame::from_direction([1.0; 3], [1.0, 2.0, 3.0]).expect("a direction");
+        let far = frame.to_world([1e307, 0.0, -1e306]);
+        let back = frame.to_local(far);
+        assert!((back[0] / 1e307 - 1.0).abs() < 1e-14 && (back[2] / 1e306 + 1.0).abs() < 1e-13);
+        let vector = frame.vector_to_world([1e307, 0.0, -1e306]);
+        assert!(vector.iter().all(|c| c.is_finite()));
+        assert_eq!(
+            AxisFrame::WORLD.to_world([1e308, 0.0, 0.0]),
+            [1e308, 0.0, 0.0]
+        );
     }
 
     #[test]

@@ -87,7 +87,7 @@ impl ZCourse {
 ///
 /// let circle = z_course(&[full_circle([3.0, 0.0], 1.0)?])?;
 /// let back = circle.reversal.ok_or("a circle runs back")?;
-/// assert_eq!((back.start, back.end), (0.25, 0.5));
+/// assert_eq!((back.start, back.end), (0.25, 0.75));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn z_course<const D: usize>(chain: &[NurbsCurve<D>]) -> Result<ZCourse, ConstructError> {
@@ -394,6 +394,28 @@ mod tests {
             z_course::<2>(&[]),
             Err(ConstructError::EmptyChain)
         ));
+    }
+
+    #[test]
+    fn the_slope_is_the_numerator_of_the_quotient_rule() {
+        use crate::math::bernstein::quotient_derivative;
+        for p in 1..=8 {
+            let value = |i: usize| Dd::of((1.7 * (i + 3 * p) as f64).sin());
+            let w: Vec<Dd> = (0..=p).map(|i| Dd::of(1.5) + value(i + 20)).collect();
+            let z: Vec<Dd> = (0..=p).map(|i| value(i) * w[i]).collect();
+            let (found, noise) = slope(&z, &w, 1.0);
+            for (k, wanted) in quotient_derivative(&z, &w).iter().enumerate() {
+                // The rule's top degree, 2 p - 1, is one too many: it is the product with (1 - t) + t.
+                let n = 2.0 * p as f64 - 1.0;
+                let before = if k > 0 { found[k - 1] } else { Dd::ZERO };
+                let here = found.get(k).copied().unwrap_or(Dd::ZERO);
+                let share = Dd::of(k as f64 / n);
+                let raised = share * before + (Dd::ONE - share) * here;
+                let gap = (raised - *wanted).abs().f64();
+                assert!(gap <= 1e-14, "degree {p}, coefficient {k}: {gap}");
+            }
+            assert!(noise.iter().all(|m| *m > Dd::ZERO));
+        }
     }
 
     #[test]

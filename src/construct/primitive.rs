@@ -56,9 +56,9 @@ pub struct SurfacePoint {
 
 impl SurfacePoint {
     /// From values in the coordinates of the frame: S, S_u, S_v, S_uu, S_uv, S_vv and the unit normal.
-    fn placed(frame: &AxisFrame, local: [[f64; 3]; 7]) -> Self {
+    fn placed(frame: &AxisFrame, local: [[f64; 3]; 7]) -> Result<Self, ConstructError> {
         let [s, u, v, uu, uv, vv, n] = local;
-        Self {
+        let placed = Self {
             point: frame.to_world(s),
             du: frame.vector_to_world(u),
             dv: frame.vector_to_world(v),
@@ -66,6 +66,24 @@ impl SurfacePoint {
             duv: frame.vector_to_world(uv),
             dvv: frame.vector_to_world(vv),
             normal: frame.direction_to_world(n),
+        };
+        let Self {
+            point,
+            du,
+            dv,
+            duu,
+            duv,
+            dvv,
+            normal,
+        } = placed;
+        let all = [point, du, dv, duu, duv, dvv, normal];
+        match all.iter().flatten().find(|c| !c.is_finite()) {
+            Some(&found) => Err(ConstructError::Parameter {
+                what: "a coordinate of the surface",
+                found,
+                wanted: "it must stay in the range of f64",
+            }),
+            None => Ok(placed),
         }
     }
 }
@@ -140,10 +158,7 @@ impl ParametricSurface for Plane {
         finite("v", v)?;
         let o = [0.0; 3];
         let (e1, e2, e3) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
-        Ok(SurfacePoint::placed(
-            &self.frame,
-            [[u, v, 0.0], e1, e2, o, o, o, e3],
-        ))
+        SurfacePoint::placed(&self.frame, [[u, v, 0.0], e1, e2, o, o, o, e3])
     }
 }
 
@@ -190,7 +205,7 @@ impl ParametricSurface for Sphere {
         let (su, cu) = u.sin_cos();
         let (e, t) = round(v);
         let (out, up) = (r * su, r * cu);
-        Ok(SurfacePoint::placed(
+        SurfacePoint::placed(
             &self.frame,
             [
                 [out * e[0], out * e[1], -up],
@@ -201,7 +216,7 @@ impl ParametricSurface for Sphere {
                 [-out * e[0], -out * e[1], 0.0],
                 [su * e[0], su * e[1], -cu],
             ],
-        ))
+        )
     }
 }
 
@@ -321,7 +336,7 @@ impl ParametricSurface for EllipticCone {
             -self.sense * (b / largest) * self.tangent,
         ];
         let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-        Ok(SurfacePoint::placed(
+        SurfacePoint::placed(
             &self.frame,
             [
                 [growth * ellipse[0], growth * ellipse[1], self.sense * u],
@@ -332,7 +347,7 @@ impl ParametricSurface for EllipticCone {
                 [-growth * ellipse[0], -growth * ellipse[1], 0.0],
                 n.map(|c| c / length),
             ],
-        ))
+        )
     }
 }
 
@@ -369,7 +384,7 @@ impl ParametricSurface for Torus {
         let (e, t) = round(v);
         let (out, up) = (self.minor * cu, self.minor * su);
         let ring = self.major + out;
-        Ok(SurfacePoint::placed(
+        SurfacePoint::placed(
             &self.frame,
             [
                 [ring * e[0], ring * e[1], up],
@@ -380,7 +395,7 @@ impl ParametricSurface for Torus {
                 [-ring * e[0], -ring * e[1], 0.0],
                 [cu * e[0], cu * e[1], su],
             ],
-        ))
+        )
     }
 }
 
