@@ -188,7 +188,7 @@ fn arcs_of_any_angle() {
             }
         }
     }
-    println!("arcs: {worst:.2} ulp");
+    eprintln!("arcs: {worst:.2} ulp");
     // Right angles are exact.
     let arc = arc(
         ORIGIN,
@@ -265,7 +265,7 @@ fn all_circles_are_circles_at_every_scale() {
             );
         }
     }
-    println!("circles: {worst:.2} ulp");
+    eprintln!("circles: {worst:.2} ulp");
     assert!(full_circle(ORIGIN, 0.0).is_err());
     assert!(full_circle(ORIGIN, f64::NAN).is_err());
     assert!(full_circle([f64::NAN, 0.0], 1.0).is_err());
@@ -321,7 +321,7 @@ fn the_biquadratic_disc() {
             assert!(corner || jacobian > 0.0, "{t} {s}: {jacobian}");
         }
     }
-    println!("disc rim: {worst:.2} ulp");
+    eprintln!("disc rim: {worst:.2} ulp");
     assert!(worst <= 4.0);
     // Turned by 135 degrees: every point times (-s, s).
     let turned = biquadratic_disc_turned(ORIGIN, 1.0, 0.0).expect("a disc");
@@ -428,7 +428,7 @@ fn spheres_of_tensor_products() {
         (&sphere, 1.0, "sphere"),
     ] {
         let (worst, sign) = sphere_residual(surface);
-        println!("{name}: {worst:.2} ulp");
+        eprintln!("{name}: {worst:.2} ulp");
         assert!(worst <= 4.0, "{name}: {worst} ulp");
         assert_eq!(sign, outward, "{name}");
     }
@@ -557,7 +557,7 @@ fn the_triangular_octant() {
             );
         }
     }
-    println!("triangle: {worst:.2} ulp");
+    eprintln!("triangle: {worst:.2} ulp");
     assert!(worst <= 4.0, "{worst} ulp");
     // Derivatives against central differences.
     let (u, v, h) = (0.3, 0.2, 1e-5);

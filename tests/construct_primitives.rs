@@ -184,14 +184,14 @@ fn rational_forms_satisfy_the_implicit_equations() {
     let off = implicit(&torus, &frame, |[x, y, z]| {
         (x.hypot(y) - 2.0).hypot(z) - 0.6
     });
-    println!("torus {:.1} ulp", off / EPS);
+    eprintln!("torus {:.1} ulp", off / EPS);
     assert!(off <= 32.0 * EPS);
     let sphere = Sphere::new(1.5, frame)
         .and_then(|t| t.to_nurbs())
         .expect("a sphere");
     assert_eq!(sphere.counts(), [5, 9]);
     let off = implicit(&sphere, &frame, |[x, y, z]| x.hypot(y).hypot(z) - 1.5);
-    println!("sphere {:.1} ulp", off / EPS);
+    eprintln!("sphere {:.1} ulp", off / EPS);
     assert!(off <= 32.0 * EPS);
     for upward in [true, false] {
         let (a, b, alpha) = (1.5, 0.7, 0.4_f64);
@@ -201,7 +201,7 @@ fn rational_forms_satisfy_the_implicit_equations() {
         let off = implicit(&surface, &frame, |[x, y, z]| {
             (x / a).hypot(y / b) - (1.0 + sense * z / a * alpha.tan())
         });
-        println!("cone {:.1} ulp", off / EPS);
+        eprintln!("cone {:.1} ulp", off / EPS);
         assert!(off <= 32.0 * EPS);
         assert!(cone.to_nurbs([cone.apex() - 1.0, 0.0]).is_err());
     }

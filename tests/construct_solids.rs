@@ -122,7 +122,7 @@ fn volumes_of_the_four_solids_by_every_construction() {
             worst = worst.max(check_volume(&solid, wanted, &name));
         }
     }
-    println!("volumes: {worst:e}");
+    eprintln!("volumes: {worst:e}");
 }
 
 #[test]
@@ -163,7 +163,7 @@ fn volumes_of_partial_turns_in_tilted_frames_at_every_scale() {
             );
         }
     }
-    println!("partial: {worst:e}");
+    eprintln!("partial: {worst:e}");
 }
 
 #[test]

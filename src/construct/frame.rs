@@ -330,12 +330,13 @@ mod tests {
     #[test]
     fn both_completions_are_right_handed_and_orthonormal() {
         for direction in directions() {
-            let forms: [fn([f64; 3], [f64; 3]) -> _; 2] = [
-                AxisFrame::from_direction,
-                AxisFrame::from_smallest_component,
+            let origin = [0.0; 3];
+            let forms = [
+                AxisFrame::from_direction(origin, direction),
+                AxisFrame::from_smallest_component(origin, direction),
             ];
-            for make in forms {
-                let frame: AxisFrame = make([0.0; 3], direction).expect("a direction");
+            for frame in forms {
+                let frame = frame.expect("a direction");
                 let [e1, e2, e3] = [0, 1, 2].map(|i| DVec3::from_array(frame.axis(i)));
                 for (found, wanted) in [
                     (e1.dot(e1), 1.0),

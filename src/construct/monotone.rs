@@ -384,7 +384,7 @@ mod tests {
         let course = z_course(&[up.clone(), down.clone()]).expect("a chain");
         let back = course.reversal.expect("the second falls");
         assert_eq!((back.curve, back.start, back.end), (1, 0.0, 1.0));
-        let falling = z_course(&[down.clone()]).expect("a chain");
+        let falling = z_course(std::slice::from_ref(&down)).expect("a chain");
         assert_eq!(falling.direction, ZDirection::Falling);
         assert!(matches!(
             z_course(&[down, up]),
