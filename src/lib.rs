@@ -48,6 +48,7 @@
 
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod construct;
 pub mod converge;
 pub mod error;
 pub mod exchange;
