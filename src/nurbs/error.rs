@@ -138,6 +138,14 @@ pub enum NurbsError {
         /// End of the domain.
         end: f64,
     },
+    /// A surface has two directions and a volume three, each named once.
+    #[error("direction {found} asked for or named twice; directions are numbered below {limit}")]
+    Direction {
+        /// The direction.
+        found: usize,
+        /// How many there are.
+        limit: usize,
+    },
     /// An interval is empty, reversed or not finite.
     #[error("the interval from {start} to {end} is not an increasing one between finite numbers")]
     Interval {
