@@ -348,3 +348,99 @@ fn check_local(t: f64) -> Result<(), NurbsError> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tensor_testing::maps;
+    use super::super::testing::{gamma, gap};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn cells() -> impl Strategy<Value = BezierCell<3>> {
+        maps::<3>().prop_map(|map| map.to_bezier().expect("finite").swap_remove(0).cell)
+    }
+
+    fn size(cell: &BezierCell<3>) -> f64 {
+        let (low, high) = cell.control_bounds();
+        low.iter().chain(&high).fold(0.0, |m, x| x.abs().max(m))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn parts_and_elevations_are_the_cell(
+            cell in cells(), k in 0..3_usize, at in 0.1..0.9_f64,
+            t in prop::array::uniform3(0.0..=1.0_f64),
+        ) {
+            let bound = size(&cell) * 8.0 * gamma(120);
+            let [before, after] = <[_; 2]>::from(cell.split(k, at).expect("inside"));
+            let mut there = t;
+            there[k] = at * t[k];
+            let expected = cell.evaluate(there).expect("inside");
+            prop_assert!(gap(before.evaluate(t).expect("inside"), expected) <= bound);
+            there[k] = (at + (1.0 - at) * t[k]).min(1.0);
+            let expected = cell.evaluate(there).expect("inside");
+            prop_assert!(gap(after.evaluate(t).expect("inside"), expected) <= bound);
+            let (low, high) = ([0.25, 0.0, 0.5], [0.75, 0.5, 1.0]);
+            let part = cell.restrict(low, high).expect("a box");
+            let there = std::array::from_fn(|k| low[k] + t[k] * (high[k] - low[k]));
+            let expected = cell.evaluate(there).expect("inside");
+            prop_assert!(gap(part.evaluate(t).expect("inside"), expected) <= bound);
+            let expected = cell.evaluate(t).expect("inside");
+            let raised = cell.elevate(k).expect("low degree");
+            prop_assert_eq!(raised.degrees()[k], cell.degrees()[k] + 1);
+            prop_assert!(gap(raised.evaluate(t).expect("inside"), expected) <= bound);
+            let spline = cell.to_spline([0.0; 3], [1.0; 3]).expect("an interval");
+            prop_assert!(gap(spline.evaluate(t).expect("inside"), expected) <= bound);
+            let (low, high) = cell.control_bounds();
+            for i in 0..3 {
+                prop_assert!(expected[i] >= low[i] - bound && expected[i] <= high[i] + bound);
+            }
+        }
+
+        #[test]
+        fn derivatives_are_those_of_the_spline(
+            cell in cells(), t in prop::array::uniform3(0.0..=1.0_f64),
+        ) {
+            let spline = cell.to_spline([0.0; 3], [1.0; 3]).expect("an interval");
+            let found = cell.derivatives(t).expect("inside");
+            let expected = spline.hessian(t).expect("inside");
+            // Weights differ a hundredfold at most, and each derivative has a factor of degree 3.
+            let bound = size(&cell) * gamma(200) * 1e6;
+            for a in 0..3 {
+                prop_assert!(gap(found.first[a], expected.first[a]) <= bound);
+                for b in 0..3 {
+                    prop_assert!(gap(found.second[a][b], expected.second[a][b]) <= bound * 1e2);
+                }
+            }
+        }
+
+        #[test]
+        fn faces_are_layers(cell in cells(), s in 0.0..=1.0_f64, t in 0.0..=1.0_f64) {
+            let bound = size(&cell) * 4.0 * gamma(100);
+            let places = [
+                [0.0, t, s], [1.0, s, t], [s, 0.0, t], [t, 1.0, s], [t, s, 0.0], [s, t, 1.0],
+            ];
+            for (face, at) in cell.faces().iter().zip(places) {
+                let found = face.evaluate([s, t]).expect("inside");
+                prop_assert!(gap(found, cell.evaluate(at).expect("inside")) <= bound);
+                let edges = face.edges().expect("valid");
+                let found = edges[1].evaluate(t).expect("inside");
+                prop_assert!(gap(found, face.evaluate([1.0, t]).expect("inside")) <= bound);
+                let found = edges[2].evaluate(s).expect("inside");
+                prop_assert!(gap(found, face.evaluate([s, 0.0]).expect("inside")) <= bound);
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_questions_are_errors() {
+        let points = vec![Homogeneous::from_point([1.0, 2.0, 3.0], 1.0); 4];
+        let cell = BezierCell::new([1, 1], points).expect("valid");
+        assert!(cell.evaluate([0.5, 1.5]).is_err() && cell.evaluate([f64::NAN, 0.5]).is_err());
+        assert!(cell.split(2, 0.5).is_err() && cell.split(0, -0.5).is_err());
+        assert!(cell.restrict([0.5, 0.0], [0.5, 1.0]).is_err());
+        assert!(cell.elevate(5).is_err());
+    }
+}

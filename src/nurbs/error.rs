@@ -202,6 +202,12 @@ pub enum NurbsError {
         /// The highest order there can be.
         limit: usize,
     },
+    /// A table of basis functions belongs to another knot vector.
+    #[error("the table of direction {direction} is not of that direction's knot vector")]
+    TableKnots {
+        /// Which direction, from 0.
+        direction: usize,
+    },
     /// The processor lacks the instructions that were asked for.
     #[error("this machine has no {level:?} instructions")]
     SimdUnavailable {

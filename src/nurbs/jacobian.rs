@@ -238,7 +238,7 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// A power of two that brings `size` to between 1 and 2; 1 for zero.
-fn to_one(size: f64) -> f64 {
+pub(super) fn to_one(size: f64) -> f64 {
     if size > 0.0 {
         // Not beyond the range of normal numbers, whose reciprocals exist.
         (-size.log2().floor().clamp(-1000.0, 1000.0)).exp2()

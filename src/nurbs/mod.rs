@@ -39,9 +39,13 @@ mod refine;
 mod tensor;
 mod tensor_bezier;
 mod tensor_derivatives;
+mod tensor_grid;
+mod tensor_integral;
 mod tensor_refine;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod tensor_testing;
 
 pub use basis::{LocalBasis, MAX_DERIVATIVE_ORDER};
 pub use bezier::{BezierPiece, RationalBezier};
@@ -57,3 +61,4 @@ pub use refine::{clamp, elevate_degree, insert_knot, refine_knots};
 pub use tensor::{NurbsSurface, NurbsTensor, NurbsVolume};
 pub use tensor_bezier::CellPiece;
 pub use tensor_derivatives::{Jacobian, TensorDerivatives};
+pub use tensor_integral::MapMoments;

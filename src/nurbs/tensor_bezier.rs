@@ -17,6 +17,7 @@
 use super::bezier::span_to_bezier;
 use super::net::{Net, indices, map_rows, window};
 use super::curve::bounds;
+use super::jacobian::to_one;
 use super::{
     BezierCell, Homogeneous, KnotSpan, KnotVector, NurbsError, NurbsSurface, NurbsTensor,
     NurbsVolume,
@@ -145,8 +146,13 @@ impl<const N: usize> NurbsTensor<N> {
         let weights = window(self.counts(), self.weights(), first, size);
         let (low, high) = bounds(near.iter().copied());
         let origin: [f64; 3] = std::array::from_fn(|i| 0.5 * low[i] + 0.5 * high[i]);
+        // Weights of about 1, by a power of two: fourth powers of them stay within range.
+        let greatest = weights.iter().fold(0.0_f64, |m, w| m.max(*w));
+        let scale = to_one(greatest);
         let points: Vec<_> = (near.iter().zip(&weights))
-            .map(|(p, &w)| Homogeneous::from_point(std::array::from_fn(|i| p[i] - origin[i]), w))
+            .map(|(p, &w)| {
+                Homogeneous::from_point(std::array::from_fn(|i| p[i] - origin[i]), w * scale)
+            })
             .collect();
         for (place, h) in points.iter().enumerate() {
             h.checked(place)?;
@@ -240,5 +246,126 @@ impl NurbsVolume {
             }
         };
         Ok([face(0)?, face(1)?, face(2)?, face(3)?, face(4)?, face(5)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::net::place;
+    use super::super::tensor_testing::{biquadratic, extent, maps, polar, sphere, torus};
+    use super::super::testing::{gamma, gap};
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn cells_are_the_map_and_share_their_layers(
+            map in maps::<3>(), t in prop::array::uniform3(0.0..=1.0_f64),
+        ) {
+            let pieces = map.to_bezier().expect("finite");
+            let counts = Spans::new(&map).cells;
+            prop_assert_eq!(pieces.len(), counts.iter().product::<usize>());
+            let bound = extent(&map) * 8.0 * gamma(150);
+            for (index, piece) in indices(counts).zip(&pieces) {
+                let at = piece.parameters(t);
+                let found = piece.cell.evaluate(t).expect("inside");
+                // The parameter is rounded: compare where its ulp is small in the span.
+                let fine = (0..3).all(|k| piece.end[k] - piece.start[k] > 1e-3 * at[k].abs());
+                if fine {
+                    let expected = map.evaluate(at).expect("inside");
+                    prop_assert!(gap(found, expected) <= bound + extent(&map) * 1e-11);
+                }
+                for k in 0..3 {
+                    if index[k] + 1 == counts[k] {
+                        continue;
+                    }
+                    let mut next = index;
+                    next[k] += 1;
+                    let next = &pieces[place(counts, next)];
+                    prop_assert_eq!(piece.end[k].to_bits(), next.start[k].to_bits());
+                    let size = piece.cell.counts();
+                    for at in indices(size) {
+                        if at[k] != 0 {
+                            continue;
+                        }
+                        let mut last = at;
+                        last[k] = size[k] - 1;
+                        prop_assert_eq!(
+                            piece.cell.control_points()[place(size, last)],
+                            next.cell.control_points()[place(size, at)]
+                        );
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn a_centred_cell_is_the_cell_moved(map in maps::<3>()) {
+            let spans = Spans::new(&map);
+            for (index, piece) in indices(spans.cells).zip(map.to_bezier().expect("finite")) {
+                let cell = map.centred_cell(&spans, index).expect("finite");
+                for (a, b) in cell.points.iter().zip(piece.cell.control_points()) {
+                    let point = a.to_point();
+                    let moved = std::array::from_fn(|i| point[i] + cell.origin[i]);
+                    prop_assert!(gap(moved, b.to_point()) <= extent(&map) * 8.0 * gamma(120));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_turn_has_four_cells_and_a_ball_eight() {
+        assert_eq!(torus(3.0, 1.0).to_bezier().expect("finite").len(), 4);
+        assert_eq!(sphere(1.0, &polar()).to_bezier().expect("finite").len(), 8);
+    }
+
+    #[test]
+    fn boundary_normals_look_out() {
+        // A ball about the origin: on the faces that are not caps of zero radius, out is away
+        // from it, whichever disc.
+        let ball = sphere(2.0, &biquadratic());
+        for (face, surface) in ball.boundary().expect("finite").iter().enumerate() {
+            let cap = face < 2;
+            assert_eq!(surface.area().expect("finite").value < 1e-20, cap);
+            if cap {
+                continue;
+            }
+            let middle = surface.domain().map(|(a, b)| 0.4 * a + 0.6 * b);
+            let point = surface.evaluate(middle).expect("inside");
+            let normal = surface.normal(middle).expect("inside").expect("regular");
+            assert!(gap(normal, point.map(|x| x / 2.0)) < 1e-14, "face {face}");
+        }
+        // An unclamped block: every face's normal leaves the point in the middle behind.
+        let knots = |n| super::super::KnotVector::unclamped_uniform(2, n).expect("valid");
+        let points = indices([4, 5, 3]).map(|i| i.map(|i| i as f64 + 0.1 * (i * i) as f64));
+        let block = NurbsVolume::new([knots(4), knots(5), knots(3)], points.collect(), vec![1.0; 60])
+            .expect("valid");
+        let inside = block.evaluate([0.5; 3]).expect("inside");
+        for surface in block.boundary().expect("finite") {
+            let point = surface.evaluate([0.5, 0.5]).expect("inside");
+            let normal = surface.normal([0.5, 0.5]).expect("inside").expect("regular");
+            let out: f64 = (0..3).map(|i| normal[i] * (point[i] - inside[i])).sum();
+            assert!(out > 0.3, "{normal:?}");
+        }
+    }
+
+    #[test]
+    fn flux_through_the_boundary_is_the_volume() {
+        // ∬ x · n / 3 over the six faces, by a midpoint rule on each: an independent volume.
+        let torus = torus(3.0, 1.0);
+        let n = 96;
+        let mut flux = 0.0;
+        for surface in torus.boundary().expect("finite") {
+            for [i, j] in indices([n, n]) {
+                let at = [(i as f64 + 0.5) / n as f64, (j as f64 + 0.5) / n as f64];
+                let (x, [s, t]) = surface.gradient(at).expect("inside");
+                let normal = super::super::tensor_derivatives::cross(s, t);
+                flux += (0..3).map(|k| x[k] * normal[k]).sum::<f64>() / 3.0 / (n * n) as f64;
+            }
+        }
+        let exact = torus.moments().expect("finite").volume.value;
+        assert!((flux - exact).abs() < 3e-3 * exact, "{flux} for {exact}");
     }
 }

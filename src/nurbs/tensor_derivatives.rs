@@ -18,6 +18,7 @@
 //!   that a volume far from the origin loses no digits but those its control points lack.
 //! * Source: Piegl & Tiller, *The NURBS Book*, 2nd ed., §4.5; for the determinant, Cramer's rule.
 
+use super::jacobian::to_one;
 use super::{Homogeneous, LocalBasis, NurbsError, NurbsSurface, NurbsTensor, NurbsVolume};
 
 /// The point of a map and its first and second derivatives at one place.
@@ -129,13 +130,6 @@ pub(super) fn determinant(rows: [Homogeneous<3>; 4]) -> f64 {
         + minor(a, b, 2, 3) * minor(c, d, 0, 1)
 }
 
-/// The homogeneous point about another origin.
-pub(super) fn about(h: Homogeneous<3>, origin: [f64; 3]) -> Homogeneous<3> {
-    Homogeneous {
-        weighted: std::array::from_fn(|i| h.weighted[i] - h.weight * origin[i]),
-        weight: h.weight,
-    }
-}
 
 impl NurbsVolume {
     /// The point, the Jacobian matrix and its determinant at the parameters (u, v, w).
@@ -161,12 +155,18 @@ impl NurbsVolume {
         let bases = self.bases(at, 1)?;
         let values = bases.each_ref().map(LocalBasis::values);
         // Any origin will do: the one at hand, within the net, keeps a far away volume's digits.
-        let rows = std::array::from_fn(|row| {
+        let rows: [Homogeneous<3>; 4] = std::array::from_fn(|row| {
             let mut rows = values;
             if let Some(k) = row.checked_sub(1) {
                 rows[k] = bases[k].derivatives(1).unwrap_or_default();
             }
             self.sum_about(&bases, &rows, point)
+        });
+        // A power of two keeps products of four weights within range.
+        let scale = to_one(rows[0].weight);
+        let rows = rows.map(|h: Homogeneous<3>| Homogeneous {
+            weighted: h.weighted.map(|a| a * scale),
+            weight: h.weight * scale,
         });
         Ok(Jacobian {
             point,
@@ -223,4 +223,149 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tensor_testing::{by_definition, extent, inside, maps, octant, turn};
+    use super::super::testing::{gamma, gap};
+    use super::super::{KnotVector, NurbsVolume};
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn points_are_those_of_the_definition(map in maps::<3>(), t in prop::array::uniform3(0.0..=1.0_f64)) {
+            let at = inside(&map, t);
+            let found = map.evaluate(at).expect("inside");
+            let expected = by_definition(&map, at);
+            let terms: usize = map.counts().iter().product();
+            let bound = 2.0 * gamma(terms + 60) * extent(&map);
+            prop_assert!(gap(found, expected) <= bound, "{found:?}, {expected:?}");
+            prop_assert_eq!(map.gradient(at).expect("inside").0.map(f64::to_bits), found.map(f64::to_bits));
+            let second = map.hessian(at).expect("inside");
+            prop_assert_eq!(second.point.map(f64::to_bits), found.map(f64::to_bits));
+        }
+
+        #[test]
+        fn four_by_four_equals_three_by_three(map in maps::<3>(), t in prop::array::uniform3(0.0..=1.0_f64)) {
+            let at = inside(&map, t);
+            let found = map.jacobian(at).expect("inside");
+            let [a, b, c] = found.columns;
+            let n = cross(b, c);
+            let expected: f64 = (0..3).map(|i| a[i] * n[i]).sum();
+            // Rounding of a derivative is relative to weights and coordinates over the span.
+            let product: f64 = (0..3).map(|k| {
+                let knots = &map.knots()[k];
+                let span = knots.find_span(at[k]).expect("inside");
+                let width = knots.knots()[span + 1] - knots.knots()[span];
+                200.0 * 3.0 * extent(&map) / width
+            }).product();
+            prop_assert!((found.determinant - expected).abs() <= gamma(400) * product,
+                "{} for {expected}", found.determinant);
+        }
+    }
+
+    /// w times the octant: a ball's octant with three derivatives known in closed form.
+    fn ball() -> NurbsVolume {
+        let shell = octant();
+        let zero = vec![[0.0; 3]; 9];
+        let knots = shell.knots().clone();
+        let [u, v] = knots;
+        NurbsVolume::new(
+            [u, v, KnotVector::bezier(1).expect("valid")],
+            [&zero, shell.control_points()].concat(),
+            [shell.weights(), shell.weights()].concat(),
+        )
+        .expect("valid")
+    }
+
+    #[test]
+    fn derivatives_of_a_ball() {
+        let ball = ball();
+        for [u, v, w] in [[0.3, 0.6, 0.9], [0.0, 0.25, 0.5], [1.0, 1.0, 1.0], [0.125, 0.0, 0.25]] {
+            let [cu, su] = turn(u);
+            let [cv, sv] = turn(v);
+            // The point derived i times by u, j times by v, k times by w.
+            let exact = |i: usize, j: usize, k: usize| {
+                let scale = [w, 1.0, 0.0][k];
+                let z = if j == 0 { su[i] } else { 0.0 };
+                [cu[i] * cv[j], cu[i] * sv[j], z].map(|x| x * scale)
+            };
+            let found = ball.hessian([u, v, w]).expect("inside");
+            let near = |a: [f64; 3], b: [f64; 3]| gap(a, b) < 2e-14;
+            assert!(near(found.point, exact(0, 0, 0)));
+            for a in 0..3 {
+                let mut orders = [0; 3];
+                orders[a] += 1;
+                let [i, j, k] = orders;
+                assert!(near(found.first[a], exact(i, j, k)), "{a}");
+                for b in 0..3 {
+                    orders[b] += 1;
+                    let [i, j, k] = orders;
+                    assert!(
+                        near(found.second[a][b], exact(i, j, k)),
+                        "{a} {b}: {:?} for {:?}",
+                        found.second[a][b],
+                        exact(i, j, k)
+                    );
+                    orders[b] -= 1;
+                }
+            }
+            let jacobian = ball.jacobian([u, v, w]).expect("inside");
+            // (dφ/du) (dλ/dv) cos φ w²; u carries z, so (u, v, w) is left-handed.
+            let exact = -4.0 / ((1.0 + u * u) * (1.0 + v * v)) * cu[0] * w * w;
+            assert!((jacobian.determinant - exact).abs() < 1e-15 * 16.0);
+        }
+    }
+
+    #[test]
+    fn far_away_the_determinant_keeps_its_digits() {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        // A brick whose corners are exact at 2^40.
+        let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1) * 2.0, f64::from(i >> 2)];
+        let line = || KnotVector::bezier(1).expect("valid");
+        let brick = NurbsVolume::new(
+            [line(), line(), line()],
+            (0..8).map(corner).collect(),
+            vec![0.3; 8],
+        )
+        .expect("valid");
+        let far = brick
+            .transform(&identity, &[2_f64.powi(40); 3])
+            .expect("finite");
+        // The point itself is rounded to 2^-12 there; the determinant takes no notice.
+        let found = far.jacobian([0.375, 0.25, 0.625]).expect("inside").determinant;
+        assert!((found - 2.0).abs() < 1e-14, "{found}");
+    }
+
+    #[test]
+    fn extreme_weights_overflow_nothing() {
+        let line = || KnotVector::bezier(1).expect("valid");
+        let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)];
+        for weight in [1e-200, 1e200] {
+            let points = (0..8).map(corner).collect();
+            let cube = NurbsVolume::new([line(), line(), line()], points, vec![weight; 8]).expect("valid");
+            let found = cube.jacobian([0.5; 3]).expect("inside").determinant;
+            assert!((found - 1.0).abs() < 1e-14, "{found}");
+            let volume = cube.moments().expect("finite").volume;
+            assert!((volume.value - 1.0).abs() <= volume.error.min(1e-13));
+            assert!(cube.orientation().is_ok());
+        }
+    }
+
+    #[test]
+    fn normals_of_a_sphere_and_none_at_its_pole() {
+        let octant = octant();
+        for at in [[0.2, 0.7], [0.9, 0.1], [0.0, 0.0]] {
+            let point = octant.evaluate(at).expect("inside");
+            let normal = octant.normal(at).expect("inside").expect("regular");
+            // u runs to the pole, v about it: inward.
+            assert!(gap(normal, point.map(|x| -x)) < 1e-15 * 4.0);
+        }
+        assert_eq!(octant.normal([1.0, 0.5]), Ok(None));
+        assert!(octant.normal([1.5, 0.5]).is_err());
+    }
 }

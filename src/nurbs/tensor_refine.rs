@@ -313,3 +313,151 @@ impl<const N: usize> NurbsTensor<N> {
         Self::from_homogeneous(knots, &points)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tensor_testing::{extent, inside, maps, sphere, biquadratic};
+    use super::super::testing::{gamma, gap, parameter};
+    use super::super::{NurbsSurface, NurbsVolume};
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Both maps at the same 27 or so parameters of the first one's domain.
+    fn same<const N: usize>(
+        a: &NurbsTensor<N>,
+        b: &NurbsTensor<N>,
+        layers: usize,
+        t: [f64; N],
+    ) -> Result<(), TestCaseError> {
+        prop_assert_eq!(a.domain(), b.domain());
+        let roundings: usize = a.degrees().iter().chain(&b.degrees()).map(|p| 9 * p + 9).sum();
+        // The quotient passes on errors of weights as large as they differ: a hundredfold here.
+        let bound = extent(a) * (4.0 * gamma(roundings) + 4.0 * gamma(5 * layers + 4));
+        for shift in [0.0, 0.33, 0.66] {
+            let at = inside(a, t.map(|t| (t + shift) % 1.0));
+            let [x, y] = [a, b].map(|m| m.evaluate(at).expect("inside"));
+            prop_assert!(gap(x, y) <= bound, "{at:?}: {x:?}, {y:?}, bound {bound:e}");
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn refinement_leaves_the_points(
+            map in maps::<2>(), k in 0..2_usize, at in 0.0..=1.0_f64,
+            t in prop::array::uniform2(0.0..=1.0_f64),
+        ) {
+            let knots = &map.knots()[k];
+            let u = parameter(knots, at);
+            let room = knots.degree().saturating_sub(knots.multiplicity(u));
+            let finer = map.insert_knot(k, u, room).expect("room for it");
+            prop_assert_eq!(finer.counts()[k], map.counts()[k] + room);
+            same(&map, &finer, room, t)?;
+            same(&map, &map.refine(k, &vec![u; room]).expect("room"), room, t)?;
+            let clamped = map.clamp().expect("finite");
+            prop_assert!(clamped.is_clamped());
+            same(&map, &clamped, 12, t)?;
+            let raised = map.elevate_degree(k, 2).expect("low degree");
+            prop_assert_eq!(raised.degrees()[k], map.degrees()[k] + 2);
+            same(&map, &raised, 60, t)?;
+        }
+
+        #[test]
+        fn volumes_are_refined_alike(
+            map in maps::<3>(), k in 0..3_usize, t in prop::array::uniform3(0.0..=1.0_f64),
+        ) {
+            same(&map, &map.elevate_degree(k, 1).expect("low degree"), 40, t)?;
+            same(&map, &map.clamp().expect("finite"), 18, t)?;
+        }
+
+        #[test]
+        fn parts_share_their_layer(
+            map in maps::<3>(), k in 0..3_usize, t in prop::array::uniform3(0.05..=0.95_f64),
+        ) {
+            let at = inside(&map, t);
+            let knots = &map.knots()[k];
+            let near = knots.knots().iter().any(|&u| u != at[k] && (u - at[k]).abs() < 1e-9);
+            prop_assume!(!near);
+            let (before, after) = map.split(k, at[k]).expect("inside");
+            prop_assert_eq!(before.domain()[k].1, at[k]);
+            prop_assert_eq!(after.domain()[k].0, at[k]);
+            let last = before.counts()[k] - 1;
+            let layer = |m: &NurbsVolume, i: usize| -> Vec<[u64; 3]> {
+                super::super::net::indices(m.counts()).zip(m.control_points())
+                    .filter(|(index, _)| index[k] == i)
+                    .map(|(_, p)| p.map(f64::to_bits))
+                    .collect()
+            };
+            prop_assert_eq!(layer(&before, last), layer(&after, 0));
+            for (part, low) in [(&before, true), (&after, false)] {
+                let mut here = at;
+                let (a, b) = part.domain()[k];
+                here[k] = a + 0.4 * (b - a);
+                let [x, y] = [part, &map].map(|m| m.evaluate(here).expect("inside"));
+                let bound = extent(&map) * 8.0 * gamma(120);
+                prop_assert!(gap(x, y) <= bound, "{low}: {x:?} {y:?}");
+            }
+        }
+
+        #[test]
+        fn parameters_reversed_moved_and_swapped(
+            map in maps::<3>(), k in 0..3_usize, t in prop::array::uniform3(0.0..=1.0_f64),
+        ) {
+            // Another parameter rounds by an ulp of the domain; a narrow span makes much of it.
+            let steep = map.knots().iter().flat_map(KnotVector::spans)
+                .fold(f64::INFINITY, |m, s| m.min(s.end - s.start));
+            prop_assume!(steep > 1e-3);
+            let at = inside(&map, t);
+            let bound = extent(&map) * 1e-9;
+            let point = map.evaluate(at).expect("inside");
+            let (a, b) = map.domain()[k];
+            let mut there = at;
+            there[k] = (a + (b - at[k])).clamp(a, b);
+            let back = map.reverse(k).expect("no knots fall together");
+            prop_assert!(gap(back.evaluate(there).expect("inside"), point) <= bound);
+            let moved = map.reparametrize(k, 3.0, 5.0).expect("an interval");
+            there[k] = (3.0 + (at[k] - a) / (b - a) * 2.0).clamp(3.0, 5.0);
+            prop_assert!(gap(moved.evaluate(there).expect("inside"), point) <= bound);
+            let turned = map.permute([2, 0, 1]).expect("a permutation");
+            let found = turned.evaluate([at[2], at[0], at[1]]).expect("inside");
+            prop_assert!(gap(found, point) <= extent(&map) * gamma(200));
+            prop_assert_eq!(turned.permute([1, 2, 0]).expect("a permutation"), map);
+        }
+    }
+
+    #[test]
+    fn a_projective_map_acts_on_points() {
+        let ball = sphere(1.0, &biquadratic());
+        let t = [
+            [1.0, 0.25, 0.0, 0.5],
+            [0.0, 2.0, 0.5, 0.0],
+            [0.25, 0.0, 1.0, 1.0],
+            [0.125, 0.0, 0.25, 4.0],
+        ];
+        let image = ball.project(&t).expect("weights stay positive");
+        for at in [[0.1, 0.2, 0.3], [0.5, 0.5, 0.5], [0.9, 1.0, 0.4]] {
+            let [x, y, z] = ball.evaluate(at).expect("inside");
+            let h = t.map(|r| r[0] * x + r[1] * y + r[2] * z + r[3]);
+            let expected = [h[0] / h[3], h[1] / h[3], h[2] / h[3]];
+            assert!(gap(image.evaluate(at).expect("inside"), expected) < 2e-15);
+        }
+        let mut far = t;
+        far[3] = [1.0, 0.0, 0.0, 0.5];
+        assert!(matches!(ball.project(&far), Err(NurbsError::Weight { .. })));
+    }
+
+    #[test]
+    fn wrong_directions_are_errors() {
+        let line = || KnotVector::bezier(1).expect("valid");
+        let sheet = NurbsSurface::new([line(), line()], vec![[0.0; 3]; 4], vec![1.0; 4]).expect("valid");
+        let wrong = |found| Err(NurbsError::Direction { found, limit: 2 });
+        assert_eq!(sheet.insert_knot(2, 0.5, 1), wrong(2));
+        assert_eq!(sheet.reverse(7), wrong(7));
+        assert_eq!(sheet.permute([1, 1]), wrong(1));
+        assert!(sheet.split(3, 0.5).is_err() && sheet.reparametrize(2, 0.0, 1.0).is_err());
+        assert!(matches!(sheet.split(0, 0.0), Err(NurbsError::SplitAtEnd { .. })));
+        assert!(matches!(sheet.split(0, f64::NAN), Err(NurbsError::OutsideDomain { .. })));
+    }
+}
