@@ -17,7 +17,7 @@ use super::dd::{Dd, Real};
 use std::sync::LazyLock;
 
 /// A node on [0, 1] and its weight.
-type Node = (Dd, Dd);
+pub(crate) type Node = (Dd, Dd);
 
 /// Points of a panel that is halved.
 const POINTS: usize = 16;
@@ -92,7 +92,7 @@ fn sum<const N: usize>(
 }
 
 /// The rule of `n` points on [0, 1], ascending.
-fn nodes(n: usize) -> Vec<Node> {
+pub(crate) fn nodes(n: usize) -> Vec<Node> {
     let half = Dd::of(0.5);
     #[allow(clippy::cast_precision_loss, reason = "a small count")]
     let guess = |i: usize| (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();

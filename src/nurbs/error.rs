@@ -138,6 +138,14 @@ pub enum NurbsError {
         /// End of the domain.
         end: f64,
     },
+    /// A surface has two directions and a volume three, each named once.
+    #[error("direction {found} asked for or named twice; directions are numbered below {limit}")]
+    Direction {
+        /// The direction.
+        found: usize,
+        /// How many there are.
+        limit: usize,
+    },
     /// An interval is empty, reversed or not finite.
     #[error("the interval from {start} to {end} is not an increasing one between finite numbers")]
     Interval {
@@ -193,6 +201,12 @@ pub enum NurbsError {
         found: usize,
         /// The highest order there can be.
         limit: usize,
+    },
+    /// A table of basis functions belongs to another knot vector.
+    #[error("the table of direction {direction} is not of that direction's knot vector")]
+    TableKnots {
+        /// Which direction, from 0.
+        direction: usize,
     },
     /// The processor lacks the instructions that were asked for.
     #[error("this machine has no {level:?} instructions")]

@@ -30,12 +30,22 @@ mod cell;
 mod curve;
 mod error;
 mod homogeneous;
+mod jacobian;
 mod kernel;
 mod knot_vector;
+mod net;
+mod orientation;
 mod refine;
 mod tensor;
+mod tensor_bezier;
+mod tensor_derivatives;
+mod tensor_grid;
+mod tensor_integral;
+mod tensor_refine;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod tensor_testing;
 
 pub use basis::{LocalBasis, MAX_DERIVATIVE_ORDER};
 pub use bezier::{BezierPiece, RationalBezier};
@@ -46,5 +56,9 @@ pub use error::NurbsError;
 pub use homogeneous::{Homogeneous, rational_derivatives};
 pub use kernel::{Kernel, SimdLevel};
 pub use knot_vector::{KnotSpan, KnotVector, MAX_DEGREE, MAX_KNOT_MAGNITUDE, MIN_SPAN_WIDTH};
+pub use orientation::{JacobianSign, Orientation, OrientationError};
 pub use refine::{clamp, elevate_degree, insert_knot, refine_knots};
 pub use tensor::{NurbsSurface, NurbsTensor, NurbsVolume};
+pub use tensor_bezier::CellPiece;
+pub use tensor_derivatives::{Jacobian, TensorDerivatives};
+pub use tensor_integral::MapMoments;

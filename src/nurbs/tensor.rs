@@ -187,7 +187,7 @@ impl<const N: usize> NurbsTensor<N> {
     }
 
     /// The basis functions at the parameters, with derivatives up to `order`.
-    fn bases(&self, at: [f64; N], order: usize) -> Result<[LocalBasis; N], NurbsError> {
+    pub(super) fn bases(&self, at: [f64; N], order: usize) -> Result<[LocalBasis; N], NurbsError> {
         let found: Result<Vec<_>, _> = (self.knots.iter().zip(at))
             .map(|(knots, u)| knots.basis_functions(u, order))
             .collect();
@@ -197,7 +197,17 @@ impl<const N: usize> NurbsTensor<N> {
     }
 
     /// Σ N_i N_j .. (w P, w) for rows of basis values over the spans of `bases`.
-    fn sum(&self, bases: &[LocalBasis; N], rows: &[&[f64]; N]) -> Homogeneous<3> {
+    pub(super) fn sum(&self, bases: &[LocalBasis; N], rows: &[&[f64]; N]) -> Homogeneous<3> {
+        self.sum_about(bases, rows, [0.0; 3])
+    }
+
+    /// The same about another origin o: Σ N_i N_j .. (w (P - o), w).
+    pub(super) fn sum_about(
+        &self,
+        bases: &[LocalBasis; N],
+        rows: &[&[f64]; N],
+        origin: [f64; 3],
+    ) -> Homogeneous<3> {
         let counts = self.counts();
         let mut sum = Homogeneous::ZERO;
         let mut index = [0_usize; N];
@@ -207,7 +217,9 @@ impl<const N: usize> NurbsTensor<N> {
                 place = place * counts[k] + bases[k].first() + index[k];
                 factor *= rows[k][index[k]];
             }
-            let part = Homogeneous::from_point(self.points[place], self.weights[place]);
+            let point = self.points[place];
+            let from_origin = std::array::from_fn(|i| point[i] - origin[i]);
+            let part = Homogeneous::from_point(from_origin, self.weights[place]);
             sum = sum.plus(factor, part);
             let Some(k) = (0..N).find(|&k| index[k] + 1 < rows[k].len()) else {
                 return sum;
