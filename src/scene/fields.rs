@@ -48,6 +48,11 @@ impl<'a> Fields<'a> {
         })
     }
 
+    /// Where the table is.
+    pub(super) fn place(&self) -> Place {
+        self.place
+    }
+
     pub(super) fn get(&self, key: &str) -> Option<&'a Value> {
         debug_assert!(self.keys.contains(&key), "{key} is not in its list");
         find(self.entries, key)

@@ -74,7 +74,7 @@ pub(super) fn volume(
 }
 
 fn only_with(fields: &Fields, key: &str, other: &str) -> Fault {
-    let place = fields.get(key).map(|v| v.place).unwrap_or_default();
+    let place = fields.get(key).map_or(fields.place(), |v| v.place);
     Fault::found(place, format!("`{key}` without {other}"), format!("{other} beside it"))
         .at_key(key)
 }
