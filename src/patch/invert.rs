@@ -115,6 +115,38 @@ struct Query<'a, E: FnOnce() -> [Dd; 3]> {
     one: bool,
 }
 
+/// A cell and a point, in f64 or in double-double.
+struct Problem<'a, T> {
+    index: usize,
+    cell: &'a Cell,
+    net: &'a [Row<T, 4>],
+    point: [T; 3],
+    /// Bound on the rounding of A - p W for the whole net.
+    noise: f64,
+    /// Relative rounding of one operation.
+    roundoff: f64,
+}
+
+/// A box that is not decided.
+struct Open<T> {
+    window: Window,
+    net: SmallVec<[Row<T, 4>; 64]>,
+    splits: usize,
+    /// Directions to split in, the longest first.
+    order: SmallVec<[usize; 3]>,
+}
+
+/// What a box has to say.
+#[allow(clippy::large_enum_variant, reason = "it is moved to the stack of boxes at once")]
+enum Answer<T> {
+    /// Nothing more.
+    Closed,
+    /// f64 does not suffice.
+    Lost,
+    /// Split it.
+    Open(Open<T>),
+}
+
 impl Cells {
     /// Where a point lies relative to the solid.
     ///
@@ -288,120 +320,166 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
     fn search(&mut self, index: usize, window: Window) {
         let cells = self.cells;
         let cell = &cells.cells[index];
-        let (p, noise) = (self.point, cell.noise + self.error);
         let before = self.found;
-        if self.halve(index, window, &cell.net, p, noise, U) {
+        let quick = Problem {
+            index,
+            cell,
+            net: &cell.net,
+            point: self.point,
+            noise: cell.noise + self.error,
+            roundoff: U,
+        };
+        if self.halve(&quick, window) {
             return;
         }
-        // What was found so far is proved, but the boxes left undecided are not known any more.
+        // The answer must not depend on how far f64 came.
         self.found = before;
-        let p = self.exactly();
-        let noise = cell.exact_noise;
-        let unit_roundoff = (-102.0_f64).exp2();
-        let _ = self.halve(index, window, &cell.exact, p, noise, unit_roundoff);
+        let exact = Problem {
+            index,
+            cell,
+            net: &cell.exact,
+            point: self.exactly(),
+            noise: cell.exact_noise,
+            roundoff: (-102.0_f64).exp2(),
+        };
+        let _ = self.halve(&exact, window);
     }
 
     /// Halves boxes of a window until all are decided; `false` when f64 does not suffice.
     ///
-    /// * `noise`: bound on the rounding of A - p W for the whole net.
-    /// * `u`: relative rounding of one operation.
-    fn halve<T: Real>(
-        &mut self,
-        index: usize,
-        window: Window,
-        net: &[Row<T, 4>],
-        p: [T; 3],
-        noise: f64,
-        u: f64,
-    ) -> bool {
-        let cells = self.cells;
-        let cell = &cells.cells[index];
-        let counts = cell.counts;
-        let most = counts[0].max(counts[1]).max(counts[2]);
-        let quick = u == U;
-        let mut first: SmallVec<[Row<T, 4>; 64]> = SmallVec::from_slice(net);
+    /// A box is split in the direction that leaves the fewest halves open. Near a line where the map
+    /// is singular every other choice doubles the boxes that meet the point.
+    fn halve<T: Real>(&mut self, problem: &Problem<T>, window: Window) -> bool {
+        let counts = problem.cell.counts;
+        let mut whole: SmallVec<[Row<T, 4>; 64]> = SmallVec::from_slice(problem.net);
         for k in 0..3 {
             let (a, b) = (window.low[k], window.low[k] + window.width[k]);
-            net::restrict(&mut first, counts, k, T::of(a), T::of(b));
+            net::restrict(&mut whole, counts, k, T::of(a), T::of(b));
         }
-        let mut stack = vec![(window, first, 6_usize)];
         let mut boxes = 0;
-        while let Some((window, net, splits)) = stack.pop() {
-            boxes += 1;
-            if quick && boxes > QUICK {
-                return false;
-            }
-            // Coordinates and |p| are at most 1 times the weight near the solid.
-            let noise = noise + 4.0 * u * (3 * most * splits) as f64;
-            let y: leaf::LocalNet = (net.iter())
-                .map(|h| {
-                    let at = |c: usize| (h[c] - p[c] * h[3]).f64();
-                    [at(0), at(1), at(2), h[3].f64()]
-                })
-                .collect();
-            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-            let mut weight = f64::INFINITY;
-            for y in &y {
-                for c in 0..3 {
-                    low[c] = low[c].min(y[c]);
-                    high[c] = high[c].max(y[c]);
-                }
-                weight = weight.min(y[3]);
-            }
-            if (0..3).any(|c| low[c] > noise || high[c] < -noise) {
-                continue;
-            }
-            let extent = (0..3).fold(0.0_f64, |m, c| m.max(high[c] - low[c])) / weight;
-            if quick && extent < 1e4 * noise {
-                return false;
-            }
-            let small = extent <= ON_BOUNDARY
-                || boxes > SOFT && extent <= 2.0 * f64::EPSILON
-                || boxes > HARD;
-            if small {
-                let faces = std::array::from_fn(|k| window.at_face(k));
-                self.found.touch_small(cell, faces);
-                self.found.place(index, parameters(window, [0.5; 3]));
-                continue;
-            }
-            let mut axis = leaf::widest(&y, counts);
-            if let Some((inverse, rows)) = leaf::frame(&y, counts) {
-                let size = (0..3).fold(0.0_f64, |m, c| m.max(high[c]).max(-low[c]));
-                let local = leaf::precondition(&y, &inverse);
-                let error = rows.map(|r| r * (noise + 4.0 * U * size));
-                let excluded = (0..3).any(|c| {
-                    local.iter().all(|b| b[c] > error[c])
-                        || local.iter().all(|b| b[c] < -error[c])
-                });
-                if excluded {
-                    continue;
-                }
-                let (kappa, bends) =
-                    leaf::bend(&local, counts, window.growth(), [0.0; 3], error);
-                if kappa <= leaf::MAX_KAPPA {
-                    let by = Certificate {
-                        inverse,
-                        rows,
-                        kappa,
-                    };
-                    if self.certified(index, window, &by, &local, error) {
-                        continue;
+        let mut stack: SmallVec<[Open<T>; 4]> = SmallVec::new();
+        match self.examine(problem, window, whole, 6, &mut boxes) {
+            Answer::Closed => {}
+            Answer::Lost => return false,
+            Answer::Open(open) => stack.push(open),
+        }
+        while let Some(open) = stack.pop() {
+            let mut best: SmallVec<[Open<T>; 2]> = SmallVec::new();
+            for (trial, &axis) in open.order.iter().enumerate() {
+                let mut left: SmallVec<[Open<T>; 2]> = SmallVec::new();
+                for side in [1, 0] {
+                    let mut net = open.net.clone();
+                    if side == 0 {
+                        net::before(&mut net, counts, axis, T::of(0.5));
+                    } else {
+                        net::after(&mut net, counts, axis, T::of(0.5));
                     }
-                } else if splits % 2 == 0 {
-                    axis = leaf::largest(bends);
+                    let half = open.window.half(axis, side);
+                    match self.examine(problem, half, net, open.splits + 1, &mut boxes) {
+                        Answer::Closed => {}
+                        Answer::Lost => return false,
+                        Answer::Open(open) => left.push(open),
+                    }
+                    if self.one && self.found.inside {
+                        return true;
+                    }
+                }
+                if trial == 0 || left.len() < best.len() {
+                    best = left;
+                }
+                if best.len() < 2 {
+                    break;
                 }
             }
-            if self.one && self.found.inside {
-                return true;
-            }
-            let mut half = net.clone();
-            net::after(&mut half, counts, axis, T::of(0.5));
-            stack.push((window.half(axis, 1), half, splits + 1));
-            let mut half = net;
-            net::before(&mut half, counts, axis, T::of(0.5));
-            stack.push((window.half(axis, 0), half, splits + 1));
+            stack.extend(best);
         }
         true
+    }
+
+    /// Decides a box, if it can be.
+    fn examine<T: Real>(
+        &mut self,
+        problem: &Problem<T>,
+        window: Window,
+        net: SmallVec<[Row<T, 4>; 64]>,
+        splits: usize,
+        boxes: &mut usize,
+    ) -> Answer<T> {
+        let (cell, p, quick) = (problem.cell, problem.point, problem.roundoff == U);
+        let counts = cell.counts;
+        let most = counts[0].max(counts[1]).max(counts[2]);
+        *boxes += 1;
+        if quick && *boxes > QUICK {
+            return Answer::Lost;
+        }
+        // Coordinates and |p| are at most 1 times the weight near the solid.
+        let noise = problem.noise + 4.0 * problem.roundoff * (3 * most * splits) as f64;
+        let y: leaf::LocalNet = (net.iter())
+            .map(|h| {
+                let at = |c: usize| (h[c] - p[c] * h[3]).f64();
+                [at(0), at(1), at(2), h[3].f64()]
+            })
+            .collect();
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let mut weight = f64::INFINITY;
+        for y in &y {
+            for c in 0..3 {
+                low[c] = low[c].min(y[c]);
+                high[c] = high[c].max(y[c]);
+            }
+            weight = weight.min(y[3]);
+        }
+        if (0..3).any(|c| low[c] > noise || high[c] < -noise) {
+            return Answer::Closed;
+        }
+        let extent = (0..3).fold(0.0_f64, |m, c| m.max(high[c] - low[c])) / weight;
+        if quick && extent < 1e3 * noise {
+            return Answer::Lost;
+        }
+        let small = extent <= ON_BOUNDARY
+            || *boxes > SOFT && extent <= 2.0 * f64::EPSILON
+            || *boxes > HARD;
+        if small {
+            let faces = std::array::from_fn(|k| window.at_face(k));
+            self.found.touch_small(cell, faces);
+            self.found.place(problem.index, parameters(window, [0.5; 3]));
+            return Answer::Closed;
+        }
+        if let Some((inverse, rows)) = leaf::frame(&y, counts) {
+            let size = (0..3).fold(0.0_f64, |m, c| m.max(high[c]).max(-low[c]));
+            let local = leaf::precondition(&y, &inverse);
+            let error = rows.map(|r| r * (noise + 4.0 * U * size));
+            let excluded = (0..3).any(|c| {
+                local.iter().all(|b| b[c] > error[c]) || local.iter().all(|b| b[c] < -error[c])
+            });
+            if excluded {
+                return Answer::Closed;
+            }
+            let (kappa, _) = leaf::bend(&local, counts, window.growth(), [0.0; 3], error);
+            if kappa <= leaf::MAX_KAPPA {
+                let by = Certificate {
+                    inverse,
+                    rows,
+                    kappa,
+                };
+                if self.certified(problem.index, window, &by, &local, error) {
+                    return Answer::Closed;
+                }
+            }
+        }
+        // Sides much shorter than the longest can wait, whatever their halves do: else a box that has
+        // the point in its middle would stay as long as it is.
+        let extents = leaf::extents(&y, counts);
+        let longest = extents[leaf::largest(extents)];
+        let mut order: SmallVec<[usize; 3]> =
+            (0..3).filter(|&k| extents[k] * 256.0 >= longest).collect();
+        order.sort_by(|&a, &b| extents[b].total_cmp(&extents[a]));
+        Answer::Open(Open {
+            window,
+            net,
+            splits,
+            order,
+        })
     }
 
     /// Decides a box on which the map is certified for this point; `false` when rounding prevents it.

@@ -35,7 +35,7 @@ const GROWTH_AT_FACE: f64 = 1.0 / (1_u32 << 20) as f64;
 
 /// Width of the smallest leaves. A map that is singular on a line needs leaves in proportion to the
 /// logarithm of this; what is nearer to the line is searched when asked for.
-const SMALLEST: f64 = 1.0 / 4096.0;
+const SMALLEST: f64 = 1.0 / 512.0;
 
 /// A net of local coefficients on the stack up to degrees (3, 3, 3).
 pub(super) type LocalNet = SmallVec<[Row<f64, 4>; 64]>;
@@ -235,26 +235,70 @@ pub(super) fn bend(
     (sums[0].max(sums[1]).max(sums[2]), bends)
 }
 
-/// The direction in which neighbours are farthest apart, times the number of steps.
-pub(super) fn widest(y: &[Row<f64, 4>], counts: Counts) -> usize {
-    let mut best = (0, -1.0);
-    for axis in 0..3 {
+/// The squares of how far apart neighbours are in each direction, times the number of steps.
+pub(super) fn extents(y: &[Row<f64, 4>], counts: Counts) -> [f64; 3] {
+    std::array::from_fn(|axis| {
         let mut change = 0.0_f64;
         net::neighbours(counts, axis, |a, b| {
             change = change.max((0..3).map(|c| (y[b][c] - y[a][c]).powi(2)).sum());
         });
         let steps = (counts[axis] - 1) as f64;
-        let extent = change * steps * steps;
-        if extent > best.1 {
-            best = (axis, extent);
-        }
-    }
-    best.0
+        change * steps * steps
+    })
 }
 
 /// The largest of three, the first of equals.
 pub(super) fn largest(v: [f64; 3]) -> usize {
     (1..3).fold(0, |m, k| if v[k] > v[m] { k } else { m })
+}
+
+/// A box on the way to leaves.
+struct Part {
+    leaf: Leaf,
+    net: Vec<Row<f64, 4>>,
+    splits: usize,
+    /// κ, infinite where there is no frame.
+    kappa: f64,
+    /// How much the map bends in each direction.
+    bends: [f64; 3],
+}
+
+impl Part {
+    /// The halves in one direction.
+    fn halves(&self, index: usize, cell: &Cell, axis: usize) -> [Self; 2] {
+        [0, 1].map(|side| {
+            let mut net = self.net.clone();
+            if side == 0 {
+                net::before(&mut net, cell.counts, axis, 0.5);
+            } else {
+                net::after(&mut net, cell.counts, axis, 0.5);
+            }
+            let window = self.leaf.window.half(axis, side);
+            examine(index, cell, window, net, self.splits + 1)
+        })
+    }
+
+    /// The halves in the direction that does most good.
+    ///
+    /// A mixed second derivative bends both of its directions alike, yet next to a line where the map
+    /// is singular only halves across the line are better than the whole. So where several directions
+    /// bend much, all are tried; where they do equally well, the longest side is halved.
+    fn split(&self, index: usize, cell: &Cell) -> [Self; 2] {
+        let most = largest(self.bends);
+        let worth = |k: usize| k == most || self.bends[k] >= 0.25 * self.bends[most];
+        let mut order = [0, 1, 2];
+        let width = self.leaf.window.width;
+        order.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
+        let rank = |h: &[Self; 2]| -> f64 { h.iter().map(|p| p.kappa.clamp(MAX_KAPPA, 4.0)).sum() };
+        let mut best: Option<[Self; 2]> = None;
+        for axis in order.into_iter().filter(|&k| worth(k)) {
+            let halves = self.halves(index, cell, axis);
+            if best.as_ref().is_none_or(|b| rank(&halves) < 0.85 * rank(b)) {
+                best = Some(halves);
+            }
+        }
+        best.unwrap_or_else(|| self.halves(index, cell, most))
+    }
 }
 
 /// Splits a cell into leaves and appends them.
@@ -263,37 +307,38 @@ pub(super) fn presplit(index: usize, cell: &Cell, cells: usize, leaves: &mut Vec
     let limit = ((1 << 18) / cells.max(1)).min((1 << 21) / cell.net.len());
     let limit = limit.clamp(32, 8192);
     let first = leaves.len();
-    let mut queue = VecDeque::from([(Window::CELL, cell.net.clone(), 0_usize)]);
-    while let Some((window, net, splits)) = queue.pop_front() {
-        let (leaf, axis) = examine(index, cell, window, &net, splits);
+    let whole = examine(index, cell, Window::CELL, cell.net.clone(), 0);
+    let mut queue = VecDeque::from([whole]);
+    while let Some(part) = queue.pop_front() {
         let full = leaves.len() - first + queue.len() >= limit;
-        if leaf.regular.is_some() || full || window.width[axis] <= SMALLEST {
-            leaves.push(leaf);
+        if part.leaf.regular.is_some() || full {
+            leaves.push(part.leaf);
             continue;
         }
-        let mut low = net.clone();
-        net::before(&mut low, cell.counts, axis, 0.5);
-        let mut high = net;
-        net::after(&mut high, cell.counts, axis, 0.5);
-        queue.push_back((window.half(axis, 0), low, splits + 1));
-        queue.push_back((window.half(axis, 1), high, splits + 1));
+        let halves = part.split(index, cell);
+        let small = (0..3).any(|k| halves[0].leaf.window.width[k] < SMALLEST);
+        if small {
+            leaves.push(part.leaf);
+        } else {
+            queue.extend(halves);
+        }
     }
 }
 
-/// The leaf of a window, and where to split when it is not regular.
+/// The leaf of a window.
 fn examine(
     index: usize,
     cell: &Cell,
     window: Window,
-    net: &[Row<f64, 4>],
+    net: Vec<Row<f64, 4>>,
     splits: usize,
-) -> (Leaf, usize) {
+) -> Part {
     let counts = cell.counts;
     let most = counts[0].max(counts[1]).max(counts[2]);
     // Each split rounds 3 p times; coordinates are at most 1 times the weight.
     let noise = 2.0 * gamma((3 * most * splits + 8) as f64);
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for h in net {
+    for h in &net {
         for c in 0..3 {
             let x = h[c] / h[3];
             bounds[0][c] = bounds[0][c].min(x - noise);
@@ -306,7 +351,7 @@ fn examine(
         bounds,
         regular: None,
     };
-    let h = net::value(net, counts, [0.5; 3]);
+    let h = net::value(&net, counts, [0.5; 3]);
     let middle = [h[0] / h[3], h[1] / h[3], h[2] / h[3]];
     let y: LocalNet = (net.iter())
         .map(|h| {
@@ -315,7 +360,15 @@ fn examine(
         })
         .collect();
     let Some((inverse, rows)) = frame(&y, counts) else {
-        return (leaf, widest(&y, counts));
+        let mut bends = [0.0; 3];
+        bends[largest(extents(&y, counts))] = 1.0;
+        return Part {
+            leaf,
+            net,
+            splits,
+            kappa: f64::INFINITY,
+            bends,
+        };
     };
     let local = precondition(&y, &inverse);
     // Of B and of q, relative to the weight, which is at most 1.
@@ -342,7 +395,13 @@ fn examine(
             hull,
         });
     }
-    (leaf, largest(bends))
+    Part {
+        leaf,
+        net,
+        splits,
+        kappa,
+        bends,
+    }
 }
 
 /// A box tree; its leaves are runs of the leaves.
