@@ -11,6 +11,19 @@ fn band(size: f64, p: DVec3) -> f64 {
     8.0 * f64::EPSILON * (size + p.length())
 }
 
+/// Mean, median, 99 % and largest.
+fn times(mut t: Vec<f64>) -> String {
+    t.sort_by(f64::total_cmp);
+    let at = |q: f64| t[((t.len() - 1) as f64 * q) as usize];
+    let mean = t.iter().sum::<f64>() / t.len() as f64;
+    format!(
+        "mean {mean:.2}, median {:.2}, 99 % {:.1}, most {:.0}",
+        at(0.5),
+        at(0.99),
+        at(1.0)
+    )
+}
+
 #[test]
 fn random_points_and_points_near_the_surface() {
     let mut random = Random(1);
@@ -19,10 +32,10 @@ fn random_points_and_points_near_the_surface() {
         let cells = Cells::new(&solid.volumes).expect("valid");
         let built = start.elapsed();
         let (mut wrong, mut decided) = (Vec::new(), 0);
-        let mut check = |p: DVec3, time: &mut f64| {
+        let mut check = |p: DVec3, times: &mut Vec<f64>| {
             let start = std::time::Instant::now();
             let found = side(&cells, p);
-            *time += start.elapsed().as_secs_f64();
+            times.push(start.elapsed().as_secs_f64() * 1e6);
             let d = (solid.sdf)(p);
             if d.abs() > band(solid.size, p) {
                 decided += 1;
@@ -31,7 +44,7 @@ fn random_points_and_points_near_the_surface() {
                 }
             }
         };
-        let (mut anywhere, mut near) = (0.0, 0.0);
+        let (mut anywhere, mut near) = (Vec::new(), Vec::new());
         for _ in 0..4000 {
             let reach = 0.75 * solid.size;
             let p = DVec3::from_array(std::array::from_fn(|_| random.within(-reach, reach)));
@@ -43,13 +56,19 @@ fn random_points_and_points_near_the_surface() {
             check(p + n * if i % 2 == 0 { d } else { -d }, &mut near);
         }
         println!(
-            "{:22} {} cells, {:6} leaves, built in {built:.1?}; {decided} decided; anywhere {:.2} us, near {:.2} us",
+            "{:22} {} cells, {:6} leaves, built in {built:.1?}; {decided} decided; us {}, near {}",
             solid.name,
             cells.len(),
             cells.leaves(),
-            anywhere / 4000.0 * 1e6,
-            near / 4000.0 * 1e6,
+            times(anywhere),
+            times(near),
         );
-        assert!(wrong.is_empty(), "{}: {} wrong, {:?}", solid.name, wrong.len(), &wrong[..wrong.len().min(4)]);
+        assert!(
+            wrong.is_empty(),
+            "{}: {} wrong, {:?}",
+            solid.name,
+            wrong.len(),
+            &wrong[..wrong.len().min(4)]
+        );
     }
 }

@@ -22,7 +22,8 @@ use super::cells::Cell;
 use super::net::{self, Counts, Row};
 use crate::math::tolerance::{U, gamma};
 use smallvec::SmallVec;
-use std::collections::VecDeque;
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 
 /// Above this κ a box is split. Certificates need κ < 1/2; what is left serves the rounding.
 pub(super) const MAX_KAPPA: f64 = 0.45;
@@ -35,7 +36,10 @@ const GROWTH_AT_FACE: f64 = 1.0 / (1_u32 << 20) as f64;
 
 /// Width of the smallest leaves. A map that is singular on a line needs leaves in proportion to the
 /// logarithm of this; what is nearer to the line is searched when asked for.
-const SMALLEST: f64 = 1.0 / 512.0;
+const SMALLEST: f64 = 1.0 / 2048.0;
+
+/// Leaves of all cells together, about.
+const LEAVES: usize = 1 << 15;
 
 /// A net of local coefficients on the stack up to degrees (3, 3, 3).
 pub(super) type LocalNet = SmallVec<[Row<f64, 4>; 64]>;
@@ -285,7 +289,7 @@ impl Part {
     /// bend much, all are tried; where they do equally well, the longest side is halved.
     fn split(&self, index: usize, cell: &Cell) -> [Self; 2] {
         let most = largest(self.bends);
-        let worth = |k: usize| k == most || self.bends[k] >= 0.25 * self.bends[most];
+        let worth = |k: usize| k == most || self.bends[k] >= 0.65 * self.bends[most];
         let mut order = [0, 1, 2];
         let width = self.leaf.window.width;
         order.sort_by(|&a, &b| width[b].total_cmp(&width[a]));
@@ -301,15 +305,57 @@ impl Part {
     }
 }
 
+/// The order in which parts are split: the one with the largest box first, as most points meet it.
+struct Turn {
+    volume: f64,
+    /// Earlier ones first among equals.
+    number: Reverse<usize>,
+    part: Part,
+}
+
+impl Turn {
+    fn new(number: usize, part: Part) -> Self {
+        let [low, high] = part.leaf.bounds;
+        // Boxes of flat parts have a volume too.
+        let volume = (0..3).map(|k| (high[k] - low[k]).max(1e-3)).product();
+        Self {
+            volume,
+            number: Reverse(number),
+            part,
+        }
+    }
+}
+
+impl Ord for Turn {
+    fn cmp(&self, other: &Self) -> Ordering {
+        (self.volume.total_cmp(&other.volume)).then(self.number.cmp(&other.number))
+    }
+}
+
+impl PartialOrd for Turn {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Turn {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Turn {}
+
 /// Splits a cell into leaves and appends them.
 pub(super) fn presplit(index: usize, cell: &Cell, cells: usize, leaves: &mut Vec<Leaf>) {
     // Bounds on memory and on the time this takes: leaves of all cells, and coefficients handled.
-    let limit = ((1 << 18) / cells.max(1)).min((1 << 21) / cell.net.len());
-    let limit = limit.clamp(32, 8192);
+    let limit = (LEAVES / cells.max(1)).min((1 << 20) / cell.net.len());
+    let limit = limit.clamp(32, 4096);
     let first = leaves.len();
     let whole = examine(index, cell, Window::CELL, cell.net.clone(), 0);
-    let mut queue = VecDeque::from([whole]);
-    while let Some(part) = queue.pop_front() {
+    let mut queue = BinaryHeap::from([Turn::new(0, whole)]);
+    let mut number = 0;
+    while let Some(Turn { part, .. }) = queue.pop() {
         let full = leaves.len() - first + queue.len() >= limit;
         if part.leaf.regular.is_some() || full {
             leaves.push(part.leaf);
@@ -319,8 +365,16 @@ pub(super) fn presplit(index: usize, cell: &Cell, cells: usize, leaves: &mut Vec
         let small = (0..3).any(|k| halves[0].leaf.window.width[k] < SMALLEST);
         if small {
             leaves.push(part.leaf);
-        } else {
-            queue.extend(halves);
+            continue;
+        }
+        for half in halves {
+            // What is decided already takes no part in the order.
+            if half.leaf.regular.is_some() {
+                leaves.push(half.leaf);
+            } else {
+                number += 1;
+                queue.push(Turn::new(number, half));
+            }
         }
     }
 }
@@ -465,7 +519,7 @@ fn grow(leaves: &[Leaf], order: &mut [usize], nodes: &mut Vec<Node>, sorted: &mu
         }
     }
     let place = nodes.len();
-    #[allow(clippy::cast_possible_truncation, reason = "at most 2^19 leaves")]
+    #[allow(clippy::cast_possible_truncation, reason = "some 2^15 leaves, or 32 for a cell")]
     let short = |n: usize| n as u32;
     let leaf = if order.len() == 1 {
         sorted.push(order[0]);

@@ -97,7 +97,9 @@ pub fn meridian(radius: f64) -> Spline<2> {
     let weight = |i: usize| if i % 2 == 0 { 1.0 } else { S };
     Spline {
         knots: knots(2, 2),
-        points: (0..5).map(|i| (p[i].map(|c| c * radius), weight(i))).collect(),
+        points: (0..5)
+            .map(|i| (p[i].map(|c| c * radius), weight(i)))
+            .collect(),
     }
 }
 
@@ -203,7 +205,11 @@ fn radius(p: DVec3) -> f64 {
 /// Radius 1, heights 0 to 2.
 fn cylinder_sdf(p: DVec3) -> f64 {
     let (a, b) = (radius(p) - 1.0, (-p.z).max(p.z - 2.0));
-    if a > 0.0 && b > 0.0 { a.hypot(b) } else { a.max(b) }
+    if a > 0.0 && b > 0.0 {
+        a.hypot(b)
+    } else {
+        a.max(b)
+    }
 }
 
 fn cylinder_surface(r: &mut Random) -> (DVec3, DVec3) {
@@ -248,7 +254,11 @@ fn torus_surface(r: &mut Random) -> (DVec3, DVec3) {
 fn wedge(p: DVec3, angle: f64) -> f64 {
     let (s, c) = angle.sin_cos();
     let (first, last) = (-p.y, p.y * c - p.x * s);
-    if angle <= TAU / 2.0 { first.max(last) } else { first.min(last) }
+    if angle <= TAU / 2.0 {
+        first.max(last)
+    } else {
+        first.min(last)
+    }
 }
 
 pub fn solids() -> Vec<Solid> {
@@ -269,13 +279,49 @@ pub fn solids() -> Vec<Solid> {
     let (tube, cone) = (line([1.0, 0.0], [1.0, 2.0]), line([1.0, 0.0], [0.0, 1.0]));
     let (ball, full) = (meridian(1.0), circle());
     let ball_sdf = |p: DVec3| p.length() - 1.0;
-    add("cylinder a", vec![by_disc(&tube)], cylinder_sdf, cylinder_surface, 2.0);
-    add("cylinder c", vec![by_axis(&tube, &full)], cylinder_sdf, cylinder_surface, 2.0);
+    add(
+        "cylinder a",
+        vec![by_disc(&tube)],
+        cylinder_sdf,
+        cylinder_surface,
+        2.0,
+    );
+    add(
+        "cylinder c",
+        vec![by_axis(&tube, &full)],
+        cylinder_sdf,
+        cylinder_surface,
+        2.0,
+    );
     add("cone a", vec![by_disc(&cone)], cone_sdf, cone_surface, 2.0);
-    add("cone c", vec![by_axis(&cone, &full)], cone_sdf, cone_surface, 2.0);
-    add("sphere a", vec![by_disc(&ball)], ball_sdf, sphere_surface, 2.0);
-    add("sphere c", vec![by_axis(&ball, &full)], ball_sdf, sphere_surface, 2.0);
-    add("torus b", vec![torus(2.0, 0.75, &full)], torus_sdf, torus_surface, 5.5);
+    add(
+        "cone c",
+        vec![by_axis(&cone, &full)],
+        cone_sdf,
+        cone_surface,
+        2.0,
+    );
+    add(
+        "sphere a",
+        vec![by_disc(&ball)],
+        ball_sdf,
+        sphere_surface,
+        2.0,
+    );
+    add(
+        "sphere c",
+        vec![by_axis(&ball, &full)],
+        ball_sdf,
+        sphere_surface,
+        2.0,
+    );
+    add(
+        "torus b",
+        vec![torus(2.0, 0.75, &full)],
+        torus_sdf,
+        torus_surface,
+        5.5,
+    );
     for angle in [1.0, 2.5, 4.5] {
         let tube = by_axis(&tube, &arc(angle));
         let ring = torus(2.0, 0.75, &arc(angle));
