@@ -62,7 +62,8 @@ pub(super) struct Found {
 /// A search under way.
 struct Search {
     best: f64,
-    foot: Option<Found>,
+    /// The part that holds the best point, and its parameters there.
+    foot: Option<(usize, [f64; 2])>,
     resolution: f64,
     visited: u32,
     square: Scalars,
@@ -95,13 +96,22 @@ pub(super) fn search(tree: &PatchTree, q: [f64; 3], limit: f64) -> Option<Found>
         |b| b.distance_squared(q),
         start * start,
         |index| {
-            minimise(&tree.parts[index], q, &mut search);
+            minimise(&tree.parts[index], index, q, &mut search);
             let floor = search.floor();
             floor * floor
         },
     );
-    let gap = search.resolution * (1.0 + search.best);
-    search.foot.map(|foot| Found { gap, ..foot })
+    let (index, at) = search.foot?;
+    let part = &tree.parts[index];
+    // Seen from the part, not from q, which may be far away.
+    let x = cartesian(part.net.evaluate(at[0], at[1]));
+    Some(Found {
+        distance: search.best,
+        foot: std::array::from_fn(|c| x[c] + part.origin[c]),
+        face: part.face,
+        parameters: [0, 1].map(|k| part.low[k] + part.sides[k] * at[k]),
+        gap: search.resolution * (1.0 + search.best),
+    })
 }
 
 /// The parameters of the first face at which it passes through `q`, to within `tolerance`.
@@ -118,7 +128,7 @@ struct Piece {
 }
 
 /// Lowers the search's best distance to that of the sub-patch, where it is less.
-fn minimise(part: &SubPatch, q: [f64; 3], search: &mut Search) {
+fn minimise(part: &SubPatch, index: usize, q: [f64; 3], search: &mut Search) {
     let q = minus(q, part.origin);
     // Control points are known to a rounding of this.
     let reach = part.radius + length(q);
@@ -148,13 +158,7 @@ fn minimise(part: &SubPatch, q: [f64; 3], search: &mut Search) {
         if foot.square.sqrt() < search.best {
             search.best = foot.square.sqrt();
             let at = [0, 1].map(|k| piece.low[k] + piece.sides[k] * foot.at[k]);
-            search.foot = Some(Found {
-                distance: search.best,
-                foot: std::array::from_fn(|c| foot.r[c] + q[c] + part.origin[c]),
-                face: part.face,
-                parameters: [0, 1].map(|k| part.low[k] + part.sides[k] * at[k]),
-                gap: 0.0,
-            });
+            search.foot = Some((index, at));
         }
         let floor = search.floor();
         let shape = Shape::new(net, &search.square, &search.weight, foot.square, noise);
@@ -222,8 +226,7 @@ fn least(net: &Net, square: &[f64], weight: &[f64], d2: f64) -> (f64, [f64; 2]) 
 /// Where a descent ended.
 struct Foot {
     at: [f64; 2],
-    /// X - q and its square.
-    r: [f64; 3],
+    /// |X - q|².
     square: f64,
     /// Half the gradient of |X - q|², with the part that rounding may add.
     slope: [f64; 2],
@@ -255,7 +258,6 @@ fn model(net: &Net, at: [f64; 2]) -> Model {
     Model {
         foot: Foot {
             at,
-            r,
             square: dot(r, r),
             slope: [dot(r, xu), dot(r, xv)],
             tangents: [metric[0].sqrt(), metric[2].sqrt()],
