@@ -1,0 +1,95 @@
+//! How far a set of faces reaches along a direction.
+//!
+//! With t the largest n · X found so far, a piece X = A / W reaches no farther where the Bernstein
+//! coefficients of h = n · A - t W are not above zero. Other pieces are halved along the parameter in
+//! which h bends more; a ridge of equal heights stays in one piece along its length.
+//!
+//! * Accuracy: the answer is attained by a point of a face, up to the rounding of the halvings; no
+//!   point reaches farther than 4 ε of the unit beyond it. A control point that is on the face and
+//!   reaches farthest is met exactly.
+
+use super::face_net::{Net, dot, real};
+use super::face_tree::{PatchTree, SubPatch};
+use smallvec::SmallVec;
+
+/// What a piece may seem to reach beyond the answer.
+const SLACK: f64 = 4.0 * f64::EPSILON;
+
+/// Pieces looked at before the slack is let grow.
+const PATIENCE: u32 = 1 << 14;
+
+/// The largest n · x over the parts, all local; `n` with components up to 1.
+pub(super) fn support(tree: &PatchTree, n: [f64; 3]) -> f64 {
+    let mut best = f64::NEG_INFINITY;
+    let (mut slack, mut visited) = (SLACK, 0_u32);
+    let corner = |min: [f64; 3], max: [f64; 3]| -> f64 {
+        (0..3).map(|c| if n[c] < 0.0 { n[c] * min[c] } else { n[c] * max[c] }).sum()
+    };
+    tree.visit_best_first(
+        |b| -corner(b.min, b.max),
+        f64::INFINITY,
+        |index| {
+            raise(&tree.parts[index], n, &mut best, &mut slack, &mut visited);
+            -(best + slack)
+        },
+    );
+    best
+}
+
+fn raise(part: &SubPatch, n: [f64; 3], best: &mut f64, slack: &mut f64, visited: &mut u32) {
+    let base = dot(n, part.origin);
+    let [p, q] = part.net.degrees;
+    // The first channel is the height above the part's origin, the last the weight.
+    let heights = part.net.map(|&x| [dot(n, [x[0], x[1], x[2]]), 0.0, 0.0, x[3]]);
+    let mut work: SmallVec<[(Net, [f64; 2]); 4]> = SmallVec::new();
+    work.push((heights, [1.0; 2]));
+    while let Some((net, sides)) = work.pop() {
+        *visited += 1;
+        if visited.is_multiple_of(PATIENCE) {
+            *slack *= 2.0;
+        }
+        for (i, j) in [(0, 0), (p, 0), (0, q), (p, q)] {
+            let x = net.points[net.at(i, j)];
+            *best = best.max(base + x[0] / x[3]);
+        }
+        let t = *best + *slack - base;
+        let h = |i: usize, j: usize| {
+            let x = net.points[net.at(i, j)];
+            x[0] - t * x[3]
+        };
+        if (0..=q).all(|j| (0..=p).all(|i| h(i, j) <= 0.0)) {
+            continue;
+        }
+        let mut bend = [0.0_f64; 2];
+        for j in 0..=q {
+            for i in 0..=p {
+                if i >= 2 {
+                    bend[0] = bend[0].max((h(i, j) - 2.0 * h(i - 1, j) + h(i - 2, j)).abs());
+                }
+                if j >= 2 {
+                    bend[1] = bend[1].max((h(i, j) - 2.0 * h(i, j - 1) + h(i, j - 2)).abs());
+                }
+            }
+        }
+        let k = usize::from(bend[1] > bend[0]);
+        // Coefficients are within this of values of h: nothing above the slack is hidden.
+        let hidden = real(p * p) * bend[0] + real(q * q) * bend[1];
+        if sides[k] < f64::EPSILON || hidden <= 0.0 {
+            continue;
+        }
+        let (before, after) = net.split(k, 0.5);
+        let mut sides = sides;
+        sides[k] *= 0.5;
+        let reach = |net: &Net| {
+            (net.points.iter()).fold(f64::NEG_INFINITY, |m, x| m.max(x[0] / x[3]))
+        };
+        // The half that reaches farther goes on top.
+        if reach(&before) < reach(&after) {
+            work.push((before, sides));
+            work.push((after, sides));
+        } else {
+            work.push((after, sides));
+            work.push((before, sides));
+        }
+    }
+}

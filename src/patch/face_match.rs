@@ -1,0 +1,218 @@
+//! Faces that two cells share drop out in pairs.
+//!
+//! Two pieces are the same when, after raising degrees to a common pair, their homogeneous control
+//! points agree up to one factor in one of the eight orders of a square net. That is a statement
+//! about maps, not only about point sets, and needs no sampling.
+//!
+//! Pieces whose knots do not match are the same map on a common part when that part is a rectangle
+//! in the parameters of both. Its corners are corners of one piece or the other, so each piece is
+//! cut at the parameters of the other's corners and the parts are compared.
+//!
+//! * Accuracy: points to [`COINCIDE`] of the unit, weights to the same share.
+//! * Cost: pieces are compared when their corners' sums, or their boxes, meet.
+
+use super::distance::locate;
+use super::face::{COINCIDE, Face};
+use super::face_net::{Net, cartesian, length, minus};
+use super::face_tree::PatchTree;
+use smallvec::SmallVec;
+
+/// Faces without those that coincide with another.
+pub(super) fn pair_off(faces: Vec<Face>) -> Vec<Face> {
+    cut_and_pair(drop_equal(faces))
+}
+
+fn corners(net: &Net) -> [[f64; 3]; 4] {
+    let [p, q] = net.degrees;
+    [(0, 0), (p, 0), (0, q), (p, q)].map(|(i, j)| cartesian(net.points[net.at(i, j)]))
+}
+
+fn coincide(a: [f64; 3], b: [f64; 3]) -> bool {
+    length(minus(a, b)) <= COINCIDE
+}
+
+/// Drops pairs of equal faces.
+fn drop_equal(faces: Vec<Face>) -> Vec<Face> {
+    /// A direction in which different faces rarely tie.
+    const MIX: [f64; 3] = [0.618_033_988, 0.414_213_562, 0.324_717_957];
+    let mut keys: Vec<(f64, usize)> = (faces.iter().enumerate())
+        .map(|(index, face)| {
+            let mut key = 0.0;
+            for x in corners(&face.net) {
+                key += (0..3).map(|c| x[c] * MIX[c]).sum::<f64>();
+            }
+            (key, index)
+        })
+        .collect();
+    keys.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut dropped = vec![false; faces.len()];
+    for (place, &(key, index)) in keys.iter().enumerate() {
+        if dropped[index] {
+            continue;
+        }
+        // Four corners, each off by the tolerance at most.
+        let near = keys[place + 1..].iter().take_while(|(other, _)| other - key <= 8.0 * COINCIDE);
+        for &(_, other) in near {
+            if !dropped[other] && is_same(&faces[index].net, &faces[other].net) {
+                (dropped[index], dropped[other]) = (true, true);
+                break;
+            }
+        }
+    }
+    keep(faces, &dropped)
+}
+
+fn keep(faces: Vec<Face>, dropped: &[bool]) -> Vec<Face> {
+    let pairs = faces.into_iter().zip(dropped);
+    pairs.filter(|(_, dropped)| !**dropped).map(|(face, _)| face).collect()
+}
+
+/// Whether two nets are one surface, up to the order of their parameters and a factor of the
+/// weights.
+fn is_same(a: &Net, b: &Net) -> bool {
+    let ends = corners(a);
+    for way in 0..8 {
+        // Corners first: they rule out nearly every way.
+        let from = corners(b);
+        let laid = |i: usize, j: usize| {
+            let (mut i, mut j) = (i, j);
+            if way & 2 != 0 {
+                i = 1 - i;
+            }
+            if way & 4 != 0 {
+                j = 1 - j;
+            }
+            if way & 1 == 0 { i + 2 * j } else { j + 2 * i }
+        };
+        let fits = |i: usize, j: usize| coincide(ends[i + 2 * j], from[laid(i, j)]);
+        if !(fits(0, 0) && fits(1, 0) && fits(0, 1) && fits(1, 1)) {
+            continue;
+        }
+        let b = b.laid(way);
+        let degrees = [0, 1].map(|k| a.degrees[k].max(b.degrees[k]));
+        let (a, b) = (a.elevated(degrees), b.elevated(degrees));
+        let factor = b.points[0][3] / a.points[0][3];
+        let same = a.points.iter().zip(&b.points).all(|(&p, &q)| {
+            (q[3] - factor * p[3]).abs() <= COINCIDE * q[3]
+                && coincide(cartesian(p), cartesian(q))
+        });
+        if same {
+            return true;
+        }
+    }
+    false
+}
+
+/// A face with what is needed to find points on it, made when first asked for.
+struct Candidate {
+    face: Face,
+    low: [f64; 3],
+    high: [f64; 3],
+    tree: Option<PatchTree>,
+}
+
+impl Candidate {
+    fn new(face: Face) -> Self {
+        let (low, high) = face.net.bounds();
+        Self {
+            face,
+            low,
+            high,
+            tree: None,
+        }
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|c| {
+            self.low[c] <= other.high[c] + COINCIDE && other.low[c] <= self.high[c] + COINCIDE
+        })
+    }
+
+    /// Inner parameters at which corners of `other` lie on this face.
+    fn cuts(&mut self, other: &Net) -> [Cuts; 2] {
+        /// Nearer to an edge of the face than this, a cut would part nothing.
+        const EDGE: f64 = 1e-9;
+        let mut cuts = [Cuts::new(), Cuts::new()];
+        let own = corners(&self.face.net);
+        for corner in corners(other) {
+            let outside = (0..3).any(|c| {
+                corner[c] < self.low[c] - COINCIDE || corner[c] > self.high[c] + COINCIDE
+            });
+            if outside || own.iter().any(|&x| coincide(x, corner)) {
+                continue;
+            }
+            let face = &self.face.net;
+            let tree = self.tree.get_or_insert_with(|| PatchTree::new([face].into_iter()));
+            let Some(at) = locate(tree, corner, COINCIDE) else {
+                continue;
+            };
+            for k in 0..2 {
+                let known = cuts[k].iter().any(|c| (c - at[k]).abs() < EDGE);
+                if at[k] > EDGE && at[k] < 1.0 - EDGE && !known {
+                    cuts[k].push(at[k]);
+                }
+            }
+        }
+        for list in &mut cuts {
+            list.sort_unstable_by(f64::total_cmp);
+        }
+        cuts
+    }
+
+    /// The face cut at the parameters.
+    fn parts(&self, cuts: &[Cuts; 2]) -> Vec<Face> {
+        let steps = cuts.each_ref().map(|list| {
+            let mut steps = vec![0.0];
+            steps.extend(list.iter().copied());
+            steps.push(1.0);
+            steps
+        });
+        let mut parts = Vec::new();
+        for v in steps[1].windows(2) {
+            for u in steps[0].windows(2) {
+                parts.push(self.face.part([u[0], v[0]], [u[1], v[1]]));
+            }
+        }
+        parts
+    }
+}
+
+type Cuts = SmallVec<[f64; 4]>;
+
+/// Cuts faces that share a part with another and drops those parts.
+fn cut_and_pair(faces: Vec<Face>) -> Vec<Face> {
+    let mut waiting: Vec<Candidate> = faces.into_iter().rev().map(Candidate::new).collect();
+    let mut done: Vec<Candidate> = Vec::new();
+    // Each success removes a common part of two faces, so there is an end; this many bounds it
+    // against parts that rounding keeps producing.
+    let mut budget = 16 * waiting.len() + 256;
+    'next: while let Some(mut one) = waiting.pop() {
+        for index in 0..done.len() {
+            if budget == 0 || !one.meets(&done[index]) {
+                continue;
+            }
+            let ours = one.cuts(&done[index].face.net);
+            let theirs = done[index].cuts(&one.face.net);
+            if ours.iter().chain(&theirs).all(|list| list.is_empty()) {
+                continue;
+            }
+            let (a, b) = (one.parts(&ours), done[index].parts(&theirs));
+            let mut gone = [vec![false; a.len()], vec![false; b.len()]];
+            for i in 0..a.len() {
+                let equal = (0..b.len()).find(|&j| !gone[1][j] && is_same(&a[i].net, &b[j].net));
+                if let Some(j) = equal {
+                    (gone[0][i], gone[1][j]) = (true, true);
+                }
+            }
+            if gone[0].contains(&true) {
+                budget -= 1;
+                done.swap_remove(index);
+                waiting.extend(keep(b, &gone[1]).into_iter().map(Candidate::new));
+                waiting.extend(keep(a, &gone[0]).into_iter().map(Candidate::new));
+                continue 'next;
+            }
+        }
+        done.push(one);
+    }
+    done.into_iter().map(|candidate| candidate.face).collect()
+}
