@@ -12,7 +12,8 @@ pub struct HalfSpace {
     pub offset: f64,
 }
 
-type Tetrahedron = [DVec3; 4];
+/// Four corners.
+pub type Tetrahedron = [DVec3; 4];
 type Tetrahedra = SmallVec<[Tetrahedron; 32]>;
 
 /// The volume that half-spaces leave of the box with corners `± half`.
@@ -21,6 +22,12 @@ type Tetrahedra = SmallVec<[Tetrahedron; 32]>;
 /// is three; so every step is exact but for rounding.
 #[must_use]
 pub fn box_volume_within(half: DVec3, spaces: &[HalfSpace]) -> f64 {
+    box_tetrahedra_within(half, spaces).iter().map(volume).sum()
+}
+
+/// Tetrahedra that together are what half-spaces leave of the box with corners `± half`.
+#[must_use]
+pub fn box_tetrahedra_within(half: DVec3, spaces: &[HalfSpace]) -> SmallVec<[Tetrahedron; 32]> {
     let mut parts: Tetrahedra = box_tetrahedra(half).into_iter().collect();
     for space in spaces {
         let mut left = Tetrahedra::new();
@@ -29,7 +36,7 @@ pub fn box_volume_within(half: DVec3, spaces: &[HalfSpace]) -> f64 {
         }
         parts = left;
     }
-    parts.iter().map(volume).sum()
+    parts
 }
 
 fn volume([a, b, c, d]: &Tetrahedron) -> f64 {

@@ -18,6 +18,7 @@ mod cap;
 mod crossings;
 mod nearest;
 mod outline;
+mod patches;
 mod revolved;
 mod tessellate;
 mod tree;

@@ -4,7 +4,7 @@
 //! most the largest half axis stretches the chord error by no more. A block's six faces are flat.
 
 use super::triangles::Mesh;
-use super::{MeshError, revolved};
+use super::{MeshError, patches, revolved};
 use crate::solid::{Block, Body, Ellipsoid};
 use glam::DVec3;
 
@@ -42,11 +42,12 @@ pub fn tessellate(body: &Body, chord_error: f64) -> Result<Mesh, MeshError> {
         Body::Revolved(one) => revolved::tessellate(one, chord_error),
         Body::Ellipsoid(one) => ellipsoid(one, chord_error),
         Body::Block(one) => block(one, chord_error),
+        Body::Patches(one) => patches::tessellate(one, chord_error),
     }
 }
 
 /// What the products and sums of a placing round, with coordinates up to a length of a local unit.
-fn rounding(origin: DVec3, unit: f64) -> f64 {
+pub(super) fn rounding(origin: DVec3, unit: f64) -> f64 {
     16.0 * f64::EPSILON * (origin.abs().max_element() + 2.0 * unit)
 }
 

@@ -31,6 +31,7 @@ pub use profile::{Boundary, Fill, ProfileLoop, Region};
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
 pub(crate) use crossings::MeridianPoint;
+pub(crate) use curve::{HomogeneousPoint, beziers};
 pub(crate) use moments::{Estimate, SectionMoments};
 pub(crate) use piece::Piece;
 pub(crate) use section::Section;

@@ -5,7 +5,7 @@ use super::model::{
     self, AxisModel, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel,
     SolidKind, SolidModel, TurnModel,
 };
-use super::shapes;
+use super::{nets, shapes};
 use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
@@ -106,6 +106,11 @@ impl Scene {
                     let made = Ellipsoid::new(&frame, DVec3::from(*radii));
                     let body = made.ok_or_else(|| unmade(&model, solid))?;
                     Part::new(solid.name.clone(), solid.material, Body::Ellipsoid(body))
+                }
+                SolidKind::Volume(volume) => {
+                    let notes = volume.notes.iter();
+                    warnings.extend(notes.map(|n| format!("{}: {n}", solid.path)));
+                    nets::part(&model, solid, volume)?
                 }
                 SolidKind::Box { size } => {
                     let frame = frame(&model, &solid.axis, &solid.steps, &solid.path)?;
@@ -330,7 +335,7 @@ fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
     Region::new(&loops, boundary, fill)
 }
 
-fn curve(curve: &CurveModel) -> ProfileCurve {
+pub(super) fn curve(curve: &CurveModel) -> ProfileCurve {
     let flat = |points: &[model::PointModel]| points.iter().map(|p| [p.r, p.z]).collect::<Vec<_>>();
     let made = match &curve.kind {
         CurveKind::Nurbs {
@@ -513,7 +518,7 @@ fn check_size(model: &SceneModel, solid: &SolidModel, part: &Part) -> Result<(),
 }
 
 /// The frame of something about an axis, placed.
-fn frame(
+pub(super) fn frame(
     model: &SceneModel,
     axis: &AxisModel,
     steps: &[PlaceStep],

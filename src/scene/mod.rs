@@ -26,6 +26,7 @@ mod json;
 mod keys;
 mod limits;
 mod model;
+mod nets;
 mod points;
 mod profile;
 mod read;

@@ -569,6 +569,10 @@ fn solid_kind(kind: &str, keys: &[&str]) -> Value {
         "operation",
         "material",
     ];
+    // Of a volume, which keys belong together is for the reader to say.
+    let required = keys
+        .iter()
+        .filter(|k| !optional.contains(k) && (kind != "volume" || **k == "kind"));
     json!({
         "description": match kind {
             "revolve" => "A profile turned about an axis.",

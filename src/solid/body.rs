@@ -13,6 +13,7 @@ use super::block::Block;
 use super::ellipsoid::Ellipsoid;
 use super::fraction::CellShape;
 use super::measure::{Measures, Moments};
+use super::patches::Patches;
 use super::path::Stretch;
 use super::revolved::Revolved;
 use super::row::{Cuts, LayerCuts, Row};
@@ -34,6 +35,8 @@ pub enum Body {
     Ellipsoid(Ellipsoid),
     /// A rectangular block.
     Block(Block),
+    /// The image of trivariate NURBS.
+    Patches(Patches),
 }
 
 /// The same question to whichever family the body is of.
@@ -43,6 +46,7 @@ macro_rules! family {
             Body::Revolved($one) => $answer,
             Body::Ellipsoid($one) => $answer,
             Body::Block($one) => $answer,
+            Body::Patches($one) => $answer,
         }
     };
 }
@@ -118,6 +122,7 @@ impl Body {
             Self::Revolved(b) => b.rows().cuts(layer, row, cuts),
             Self::Ellipsoid(b) => b.cuts(row, cuts),
             Self::Block(b) => b.cuts(row, cuts),
+            Self::Patches(b) => b.cuts(row, cuts),
         }
     }
 
@@ -132,7 +137,7 @@ impl Body {
         let sections = match self {
             Self::Revolved(b) => Some(CellShape::new(b.frame(), sides)),
             Self::Ellipsoid(b) => Some(b.cell_shape(sides)),
-            Self::Block(_) => None,
+            Self::Block(_) | Self::Patches(_) => None,
         };
         VoxelShape { sides, sections }
     }
@@ -153,6 +158,7 @@ impl Body {
                 b.fraction_within(shape, centre, spaces, tolerance)
             }
             (Self::Block(b), _) => b.fraction_within(voxel.sides, centre, spaces),
+            (Self::Patches(b), _) => b.fraction_within(voxel.sides, centre, spaces, tolerance),
             // A shape is made by the body that uses it.
             _ => 0.0,
         }
@@ -182,6 +188,7 @@ impl Body {
             Self::Revolved(b) => Self::Revolved(b.translated(by)),
             Self::Ellipsoid(b) => Self::Ellipsoid(b.translated(by)),
             Self::Block(b) => Self::Block(b.translated(by)),
+            Self::Patches(b) => Self::Patches(b.translated(by)),
         }
     }
 
@@ -210,6 +217,7 @@ impl Body {
     pub(super) fn price(&self) -> u64 {
         match self {
             Self::Revolved(b) => b.price(),
+            Self::Patches(_) => 30,
             _ => 1,
         }
     }
@@ -217,9 +225,10 @@ impl Body {
     /// Whether the surface may come within `margin` (scene units) of a stretch of a path.
     pub(super) fn may_meet(&self, stretch: &Stretch, margin: f64) -> bool {
         match self {
-            Self::Revolved(b) => b.may_meet(stretch, margin),
-            Self::Block(b) => b.may_meet(stretch, margin),
-            Self::Ellipsoid(_) => true,
+            Self::Revolved(b) if !stretch.path.is_free() => b.may_meet(stretch, margin),
+            Self::Block(b) if !stretch.path.is_free() => b.may_meet(stretch, margin),
+            // The distance tells.
+            _ => true,
         }
     }
 }

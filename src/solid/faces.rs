@@ -192,7 +192,7 @@ impl Faces {
                 continue;
             }
             let m = 0.5 * (from + to);
-            let [outside, inside] = rule.beside.map(|p| self.holds(p.at(m)));
+            let [outside, inside] = [0, 1].map(|k| self.holds(rule.beside[k].at(m)));
             let mut sign = f64::from(u8::from(inside)) - f64::from(u8::from(outside));
             if sign != 0.0 && self.belongs_to_earlier(sheet.body, rule.path.at(m)) {
                 sign = 0.0;
@@ -230,7 +230,7 @@ pub(super) fn direction(k: usize) -> DVec3 {
 }
 
 fn bounds(path: &Path, range: [f64; 2], margin: f64) -> Aabb {
-    let of = |k: usize| path.support(direction(k), range);
+    let of = |k: usize| path.furthest(direction(k), range);
     Aabb {
         min: -DVec3::new(of(3), of(4), of(5)) - margin,
         max: DVec3::new(of(0), of(1), of(2)) + margin,

@@ -16,6 +16,8 @@ mod faces;
 mod fraction;
 mod measure;
 mod part;
+mod patch_fraction;
+mod patches;
 mod path;
 mod revolved;
 mod row;
@@ -33,6 +35,7 @@ pub use body::Body;
 pub use ellipsoid::Ellipsoid;
 pub use measure::{MeasureErrors, Measures, Moments};
 pub use part::{Operation, Part};
+pub use patches::Patches;
 pub use revolved::Revolved;
 pub use turn::Turn;
 

@@ -6,17 +6,21 @@
 //! where a parabola through them leaves no doubt.
 
 use super::body::Body;
+use super::patches::FaceLine;
 use super::turn::Turn;
 use crate::math::{Aabb, Side};
 use glam::{DVec2, DVec3};
+use std::sync::Arc;
 
 /// A parametrised path in space.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Path {
     /// `centre + u cos s + v sin s`, u and v normal to each other: a circle, or an ellipse.
     Circle { centre: DVec3, u: DVec3, v: DVec3 },
     /// `start + s along`.
     Line { start: DVec3, along: DVec3 },
+    /// A line on a rational patch, moved along its normal.
+    Face { line: Arc<FaceLine>, off: f64 },
 }
 
 /// Half width of a stretch below which a parabola is trusted.
@@ -55,7 +59,7 @@ impl Stretch<'_> {
         let furthest = square.sqrt() + speed * half;
         let tilt = match path {
             Path::Circle { u, v, .. } => u.z.hypot(v.z),
-            Path::Line { .. } => 0.0,
+            _ => 0.0,
         };
         // (ρ²)'' = 2 |P'|² + 2 P·P''
         let curvature = 2.0 * (speed * speed + furthest * bend);
@@ -101,12 +105,13 @@ impl Stretch<'_> {
 
 impl Path {
     pub(super) fn at(&self, s: f64) -> DVec3 {
-        match *self {
+        match self {
             Self::Circle { centre, u, v } => {
                 let (sin, cos) = s.sin_cos();
-                centre + u * cos + v * sin
+                *centre + *u * cos + *v * sin
             }
-            Self::Line { start, along } => start + along * s,
+            Self::Line { start, along } => *start + *along * s,
+            Self::Face { line, off } => line.at(s, *off),
         }
     }
 
@@ -115,6 +120,20 @@ impl Path {
         match self {
             Self::Circle { u, v, .. } => u.length().max(v.length()),
             Self::Line { along, .. } => along.length(),
+            Self::Face { line, .. } => line.speed(),
+        }
+    }
+
+    /// Whether nothing but its points and its speed is known of it.
+    pub(super) fn is_free(&self) -> bool {
+        matches!(self, Self::Face { .. })
+    }
+
+    /// A bound on [`support`](Self::support).
+    pub(super) fn furthest(&self, direction: DVec3, range: [f64; 2]) -> f64 {
+        match self {
+            Self::Face { line, off } => line.reach(direction) + off.abs() * direction.length(),
+            _ => self.support(direction, range),
         }
     }
 
@@ -129,7 +148,30 @@ impl Path {
                 return ends.max(direction.dot(self.at(peak)));
             }
         }
+        if self.is_free() {
+            return ends.max(self.peak(direction, [a, b]));
+        }
         ends
+    }
+
+    /// The largest `direction · x` beside the best of some points: golden section.
+    fn peak(&self, direction: DVec3, [a, b]: [f64; 2]) -> f64 {
+        const PARTS: u32 = 16;
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let height = |s: f64| direction.dot(self.at(s));
+        let place = |k: u32| a + (b - a) * f64::from(k) / f64::from(PARTS);
+        let best = (0..=PARTS).max_by(|&i, &j| height(place(i)).total_cmp(&height(place(j))));
+        let best = best.unwrap_or_default();
+        let (mut low, mut high) = (place(best.saturating_sub(1)), place((best + 1).min(PARTS)));
+        for _ in 0..60 {
+            let step = (high - low) * GOLDEN;
+            if height(high - step) < height(low + step) {
+                low = high - step;
+            } else {
+                high = low + step;
+            }
+        }
+        height(0.5 * (low + high))
     }
 
     /// The path in a body's local coordinates.
@@ -137,27 +179,30 @@ impl Path {
         let frame = body.frame();
         let point = |p| frame.to_local(p).point;
         let vector = |v| frame.vector_to_local(v);
-        match *self {
+        match self {
             Self::Circle { centre, u, v } => Self::Circle {
-                centre: point(centre),
-                u: vector(u),
-                v: vector(v),
+                centre: point(*centre),
+                u: vector(*u),
+                v: vector(*v),
             },
             Self::Line { start, along } => Self::Line {
-                start: point(start),
-                along: vector(along),
+                start: point(*start),
+                along: vector(*along),
             },
+            // Free paths are only asked for their points, in the world.
+            Self::Face { .. } => self.clone(),
         }
     }
 
     /// First derivative and a bound of the second.
     fn slopes(&self, s: f64) -> (DVec3, f64) {
-        match *self {
+        match self {
             Self::Circle { u, v, .. } => {
                 let (sin, cos) = s.sin_cos();
-                (v * cos - u * sin, self.speed())
+                (*v * cos - *u * sin, self.speed())
             }
-            Self::Line { along, .. } => (along, 0.0),
+            Self::Line { along, .. } => (*along, 0.0),
+            Self::Face { .. } => (DVec3::ZERO, 0.0),
         }
     }
 
@@ -170,7 +215,7 @@ impl Path {
                 let round = (v.length() - size).abs() <= 1e-14 * size;
                 round && off <= 1e-14 * size && u.z.hypot(v.z) <= 1e-14 * size
             }
-            Self::Line { .. } => false,
+            _ => false,
         }
     }
 

@@ -6,8 +6,10 @@
 //!
 //! A patch of a body's surface gives for each parameter t a path in s, with the normal along it.
 
+use super::patches::FaceLine;
 use super::path::Path;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// One patch of a body's surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,16 +53,19 @@ pub(super) enum Normal {
     Turning { u: DVec3, v: DVec3, along: DVec3 },
     /// The same all along the line.
     Fixed(DVec3),
+    /// That of a rational patch, or its opposite.
+    Face { line: Arc<FaceLine>, sign: f64 },
 }
 
 impl Normal {
     pub(super) fn at(&self, s: f64) -> DVec3 {
-        match *self {
+        match self {
             Self::Turning { u, v, along } => {
                 let (sin, cos) = s.sin_cos();
-                u * cos + v * sin + along
+                *u * cos + *v * sin + *along
             }
-            Self::Fixed(n) => n,
+            Self::Fixed(n) => *n,
+            Self::Face { line, sign } => line.normal(s) * *sign,
         }
     }
 }

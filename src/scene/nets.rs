@@ -1,0 +1,386 @@
+//! From the data of a volume to its NURBS.
+
+use super::build::{curve, frame};
+use super::model::{
+    self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
+    VolumeModel, VolumeSource,
+};
+use crate::construct::{
+    AngleInterval, AxisFrame, CircleForm, ConstructError, DiscForm, curve_disc, curve_to_axis,
+    meridian, surface_circle,
+};
+use crate::error::Error;
+use crate::math::Similarity;
+use crate::math::bernstein;
+use crate::math::{Dd, Real};
+use crate::nurbs::{KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError};
+use crate::region::{Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, beziers};
+use crate::solid::{Body, Part, Patches, Turn};
+use std::sync::Arc;
+
+/// The part that a volume is.
+pub(super) fn part(
+    model: &SceneModel,
+    solid: &SolidModel,
+    volume: &VolumeModel,
+) -> Result<Part, Error> {
+    let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
+    let maker = Maker { model, solid };
+    let volumes = match &volume.source {
+        VolumeSource::Patches(patches) => maker.patches(patches)?,
+        VolumeSource::Section { section, turn } => vec![maker.section(section, *turn)?],
+        VolumeSource::Curve {
+            form,
+            profile,
+            turn,
+            union,
+        } => {
+            let chain = maker.chain(&model.profiles[*profile].1)?;
+            if let Some(back) = chain.reversal {
+                if !*union {
+                    return Err(maker.runs_back(back));
+                }
+                return maker.stack(&frame, &chain, *turn);
+            }
+            maker.curve(*form, chain, *turn)?
+        }
+    };
+    for (index, volume) in volumes.iter().enumerate() {
+        maker.check(index, volume)?;
+    }
+    let body = Patches::new(&frame, volumes).map_err(|e| maker.refused(&e.to_string()))?;
+    Ok(Part::new(
+        solid.name.clone(),
+        solid.material,
+        Body::Patches(body),
+    ))
+}
+
+/// A part of a chain with z monotone: a rational Bézier piece.
+#[derive(Debug, Clone)]
+struct Piece {
+    /// Which curve of the chain it is of.
+    curve: usize,
+    points: Vec<HomogeneousPoint>,
+}
+
+/// The chain of a profile in pieces along which z rises, or is level.
+struct Chain {
+    pieces: Vec<Piece>,
+    /// A piece that runs against those before it, where one does.
+    reversal: Option<usize>,
+}
+
+impl Piece {
+    fn end(&self, at: usize) -> [f64; 2] {
+        let [r, z, w] = self.points[at];
+        [(r / w).f64(), (z / w).f64()]
+    }
+
+    fn ends(&self) -> [[f64; 2]; 2] {
+        [self.end(0), self.end(self.points.len() - 1)]
+    }
+
+    /// How far z rises along it.
+    fn rise(&self) -> f64 {
+        let [[_, a], [_, b]] = self.ends();
+        b - a
+    }
+
+    fn reversed(mut self) -> Self {
+        self.points.reverse();
+        self
+    }
+
+    fn curve(&self) -> Result<NurbsCurve<2>, NurbsError> {
+        joined(std::slice::from_ref(self))
+    }
+}
+
+/// Consecutive pieces of one degree as one curve over [0, their number].
+fn joined(pieces: &[Piece]) -> Result<NurbsCurve<2>, NurbsError> {
+    let degree = pieces[0].points.len() - 1;
+    let (mut knots, mut points, mut weights) = (vec![0.0], Vec::new(), Vec::new());
+    for (index, piece) in pieces.iter().enumerate() {
+        #[allow(clippy::cast_precision_loss, reason = "a count")]
+        knots.extend(vec![index as f64; degree]);
+        for (k, [r, z, w]) in piece.points.iter().enumerate() {
+            if index > 0 && k == 0 {
+                continue;
+            }
+            points.push([(*r / *w).f64(), (*z / *w).f64()]);
+            weights.push(w.f64());
+        }
+    }
+    #[allow(clippy::cast_precision_loss, reason = "a count")]
+    knots.extend(vec![pieces.len() as f64; degree + 1]);
+    NurbsCurve::new(KnotVector::new(degree, knots)?, points, weights)
+}
+
+/// Makes the nets of one solid.
+struct Maker<'a> {
+    model: &'a SceneModel,
+    solid: &'a SolidModel,
+}
+
+impl Maker<'_> {
+    fn fault(&self, key: &str, found: String, wanted: &str, hint: Option<String>) -> Error {
+        let path = format!("{}{key}", self.solid.path);
+        let error = self.model.error(self.solid.place, &path, Some(found), wanted, hint);
+        error.into()
+    }
+
+    fn refused(&self, reason: &str) -> Error {
+        self.fault("", reason.to_owned(), "a volume that can be made", None)
+    }
+
+    fn patches(&self, patches: &[PatchModel]) -> Result<Vec<NurbsVolume>, Error> {
+        let made = patches.iter().enumerate().map(|(index, patch)| {
+            volume_of(patch).map_err(|e| {
+                let path = format!("{}.patches[{index}]", self.solid.path);
+                let found = Some(e.to_string());
+                let error = self.model.error(patch.place, &path, found, "a NURBS volume", None);
+                Error::from(error)
+            })
+        });
+        made.collect()
+    }
+
+    /// Refuses a patch that folds.
+    fn check(&self, index: usize, volume: &NurbsVolume) -> Result<(), Error> {
+        let Err(error) = volume.orientation() else {
+            return Ok(());
+        };
+        // A cell without volume adds nothing, and what could not be settled is not known to fold.
+        match error {
+            OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
+                let key = format!(".patches[{index}]");
+                let wanted = "a Jacobian determinant of one sign";
+                let hint = "split the patch where it folds, or move its control points";
+                Err(self.fault(&key, error.to_string(), wanted, Some(hint.to_owned())))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn section(&self, section: &SectionModel, turn: TurnModel) -> Result<NurbsVolume, Error> {
+        let made = || -> Result<NurbsVolume, ConstructError> {
+            let [u, v] = [0, 1].map(|k| KnotVector::new(section.degrees[k], section.knots[k].clone()));
+            let points = section.points.iter().map(|[r, z]| [*r, 0.0, *z]);
+            let surface =
+                NurbsSurface::new([u?, v?], points.collect(), section.weights.clone())?;
+            let turn = AngleInterval::new(turn.start, turn.angle)?;
+            surface_circle(&surface, CircleForm::Quadratic, turn, &AxisFrame::WORLD)
+        };
+        made().map_err(|e| {
+            let path = format!("{}.section", self.solid.path);
+            let found = Some(e.to_string());
+            let wanted = "a planar surface that can be turned";
+            let error = self.model.error(section.place, &path, found, wanted, None);
+            error.into()
+        })
+    }
+
+    /// The chain of a profile, in pieces.
+    fn chain(&self, profile: &ProfileModel) -> Result<Chain, Error> {
+        let wanted = "a profile with boundary = \"to-axis\" and one chain, `curves`";
+        let found = match (&profile.curves, profile.boundary) {
+            (Some(_), model::Boundary::ToAxis) if profile.loops.is_empty() => None,
+            (_, model::Boundary::Closed) => Some("a profile with boundary = \"closed\""),
+            _ => Some("a profile with loops"),
+        };
+        if let Some(found) = found {
+            return Err(self.fault(".profile", found.to_owned(), wanted, None));
+        }
+        let mut pieces = Vec::new();
+        for (index, one) in profile.curves.iter().flatten().enumerate() {
+            let found = beziers(&curve(one)).map_err(|reason| {
+                let found = Some(format!("a curve that {reason}"));
+                let wanted = "a curve that can be drawn";
+                Error::from(self.model.error(one.place, &one.path, found, wanted, None))
+            })?;
+            for bezier in found {
+                split_at_extrema(index, bezier.points, &mut pieces);
+            }
+        }
+        let rises: Vec<f64> = pieces.iter().map(Piece::rise).collect();
+        let first = rises.iter().copied().find(|r| *r != 0.0).unwrap_or_default();
+        let reversal = rises.iter().position(|r| r * first < 0.0);
+        if first < 0.0 && reversal.is_none() {
+            pieces.reverse();
+            pieces = pieces.into_iter().map(Piece::reversed).collect();
+        }
+        Ok(Chain { pieces, reversal })
+    }
+
+    fn runs_back(&self, piece: usize) -> Error {
+        let found = format!("a chain that runs back along the axis, at its monotone part {piece}");
+        let wanted = "a chain along which z rises, or falls, all the way";
+        let hint = "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
+        self.fault(".profile", found, wanted, Some(hint.to_owned()))
+    }
+
+    /// The volumes of a chain that rises: one for each run of pieces of one curve, split where discs
+    /// of different radii meet so that each face has one neighbour.
+    fn curve(
+        &self,
+        form: CurveForm,
+        chain: Chain,
+        turn: TurnModel,
+    ) -> Result<Vec<NurbsVolume>, Error> {
+        let mut runs: Vec<Vec<Piece>> = Vec::new();
+        let mut broken = true;
+        for piece in chain.pieces {
+            if piece.rise() == 0.0 {
+                broken = true;
+                continue;
+            }
+            match runs.last_mut() {
+                Some(run)
+                    if !broken
+                        && run[0].curve == piece.curve
+                        && run[0].points.len() == piece.points.len() =>
+                {
+                    run.push(piece);
+                }
+                _ => runs.push(vec![piece]),
+            }
+            broken = false;
+        }
+        let radii: Vec<[f64; 2]> = runs
+            .iter()
+            .map(|run| [run[0].ends()[0][0], run[run.len() - 1].ends()[1][0]])
+            .collect();
+        let splits = splits(&radii);
+        let made = || -> Result<Vec<NurbsVolume>, ConstructError> {
+            let angle = AngleInterval::new(turn.start, turn.angle)?;
+            let stepped = splits.iter().any(|s| !s.is_empty());
+            let regular = form == CurveForm::Disc && angle.is_full() && !stepped;
+            let volumes = runs.iter().zip(&splits).map(|(run, splits)| {
+                let curve = meridian(&joined(run)?)?;
+                let world = &AxisFrame::WORLD;
+                if regular {
+                    return curve_disc(&curve, DiscForm::Biquadratic, angle, world);
+                }
+                // The polar disc makes of a what c is.
+                let whole = curve_to_axis(&curve, CircleForm::Quadratic, angle, world)?;
+                Ok(whole.refine(1, splits)?)
+            });
+            volumes.collect()
+        };
+        made().map_err(|e| self.fault(".profile", e.to_string(), "a chain that can be turned", None))
+    }
+
+    /// The union of the discs of a chain that runs back: every piece with the axis is a loop of one
+    /// direction.
+    fn stack(&self, frame: &Similarity, chain: &Chain, turn: TurnModel) -> Result<Part, Error> {
+        let made = || -> Result<Region, String> {
+            let mut loops: Vec<ProfileLoop> = Vec::new();
+            for piece in chain.pieces.iter().filter(|p| p.rise() != 0.0) {
+                let piece = if piece.rise() > 0.0 {
+                    piece.clone()
+                } else {
+                    piece.clone().reversed()
+                };
+                let curve = piece.curve().map_err(|e| e.to_string())?;
+                let [[r0, z0], [r1, z1]] = piece.ends();
+                let mut back = vec![[r1, z1], [0.0, z1], [0.0, z0], [r0, z0]];
+                back.dedup();
+                loops.push(vec![
+                    ProfileCurve::Nurbs {
+                        degree: curve.degree(),
+                        knots: curve.knots().knots().to_vec(),
+                        points: curve.control_points().to_vec(),
+                        weights: curve.weights().to_vec(),
+                    },
+                    ProfileCurve::Polyline { points: back },
+                ]);
+            }
+            Region::new(&loops, Boundary::Closed, Fill::NonZero).map_err(|e| e.to_string())
+        };
+        let region = made()
+            .map_err(|e| self.fault(".profile", e, "a chain whose discs can be joined", None))?;
+        Ok(Part::revolved(
+            self.solid.name.clone(),
+            self.solid.material,
+            Arc::new(region),
+            frame,
+            Turn::new(turn.start, turn.angle),
+        ))
+    }
+}
+
+/// The NURBS of a patch.
+fn volume_of(patch: &PatchModel) -> Result<NurbsVolume, NurbsError> {
+    let [u, v, w] = [0, 1, 2].map(|k| KnotVector::new(patch.degrees[k], patch.knots[k].clone()));
+    NurbsVolume::new([u?, v?, w?], patch.points.clone(), patch.weights.clone())
+}
+
+/// Cuts a piece where z turns.
+fn split_at_extrema(curve: usize, points: Vec<HomogeneousPoint>, out: &mut Vec<Piece>) {
+    let column = |k: usize| points.iter().map(|p| p[k]).collect::<Vec<Dd>>();
+    let [r, z, w] = [column(0), column(1), column(2)];
+    let turning = bernstein::quotient_derivative(&z, &w);
+    let scale = bernstein::magnitude(&z) * bernstein::magnitude(&w);
+    let mut cuts = bernstein::sign_change_parameters(&turning, scale);
+    cuts.retain(|t| *t > Dd::ZERO && *t < Dd::ONE);
+    let mut from = Dd::ZERO;
+    cuts.push(Dd::ONE);
+    for to in cuts {
+        let part = |c: &[Dd]| bernstein::restrict(c, from, to);
+        let [r, z, w] = [part(&r), part(&z), part(&w)];
+        let points = (0..r.len()).map(|i| [r[i], z[i], w[i]]);
+        out.push(Piece {
+            curve,
+            points: points.collect(),
+        });
+        from = to;
+    }
+}
+
+/// Shares of the radius at which volumes between the radii `[bottom, top]` are split, so that where
+/// one ends and the next begins, or goes on at another radius, discs and rings match.
+fn splits(radii: &[[f64; 2]]) -> Vec<Vec<f64>> {
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.max(b);
+    let mut splits: Vec<Vec<f64>> = vec![Vec::new(); radii.len()];
+    let mut add = |volume: usize, share: f64| {
+        let known = splits[volume].iter().any(|&s| close(s, share));
+        if share > 1e-12 && share < 1.0 - 1e-12 && !known {
+            splits[volume].push(share);
+        }
+    };
+    for joint in 1..radii.len() {
+        let (below, above) = (radii[joint - 1][1], radii[joint][0]);
+        if close(below, above) {
+            continue;
+        }
+        let edge = below.min(above);
+        // The line goes up and down from here as far as there is volume around it.
+        let mut share = edge / above;
+        for volume in joint..radii.len() {
+            add(volume, share);
+            let Some(next) = radii.get(volume + 1) else {
+                break;
+            };
+            share = share * radii[volume][1] / next[0];
+            if !(share < 1.0 - 1e-12) {
+                break;
+            }
+        }
+        let mut share = edge / below;
+        for volume in (0..joint).rev() {
+            add(volume, share);
+            if volume == 0 {
+                break;
+            }
+            share = share * radii[volume][0] / radii[volume - 1][1];
+            if !(share < 1.0 - 1e-12) {
+                break;
+            }
+        }
+    }
+    for list in &mut splits {
+        list.sort_by(f64::total_cmp);
+    }
+    splits
+}

@@ -1,0 +1,422 @@
+//! A solid that is the image of trivariate NURBS, in its place.
+//!
+//! Membership is point inversion over the Bézier cells, distance that to the outer faces, rows ask
+//! where their line may meet those; see [`crate::patch`]. What is moved is the question, not the net.
+//!
+//! * Units: local lengths are those of the nets; the frame scales and places them.
+//! * Volume and moments: integrals of the Jacobian determinant, every patch counted positive.
+
+use super::measure::Moments;
+use super::path::Path;
+use super::row::{Cuts, Row};
+use super::rule::{Area, Normal, Patch, Rule};
+use super::seeds::Seeds;
+use crate::math::quadrature::Integral;
+use crate::math::{Aabb, Dd, Real, Side, Similarity};
+use crate::nurbs::{BezierCell, MapMoments, NurbsError, NurbsSurface, NurbsVolume};
+use crate::patch::{Cells, FaceSet, Preimage};
+use glam::DVec3;
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// Nets with all that is known of them; shared by the places they are put in.
+#[derive(Debug)]
+pub(crate) struct Nets {
+    volumes: Vec<NurbsVolume>,
+    cells: Cells,
+    faces: FaceSet,
+    moments: MapMoments,
+    /// The point that the moments are about, and the area of the outer faces.
+    about: [f64; 3],
+    area: Integral,
+}
+
+/// The image of one or several trivariate NURBS.
+#[derive(Debug, Clone)]
+pub struct Patches {
+    frame: Similarity,
+    nets: Arc<Nets>,
+    bounds: Aabb,
+    /// Far wider than any rounding of the bounds, far narrower than the solid.
+    margin: f64,
+}
+
+impl Patches {
+    /// The volumes, whose coordinates are local lengths of the frame.
+    ///
+    /// # Errors
+    /// [`NurbsError`] when control points lie too far apart for their differences to be finite.
+    pub fn new(frame: &Similarity, volumes: Vec<NurbsVolume>) -> Result<Self, NurbsError> {
+        let cells = Cells::new(&volumes)?;
+        let faces = FaceSet::new(&volumes)?;
+        let around = faces.bounds();
+        let about = around.map_or(DVec3::ZERO, |b: Aabb| 0.5 * (b.min + b.max)).to_array();
+        let mut moments = MapMoments::default();
+        for volume in &volumes {
+            add(&mut moments, &volume.moments_about(about)?);
+        }
+        let mut area = Integral::default();
+        for face in faces.faces() {
+            let surface: NurbsSurface = face.surface.to_spline([0.0; 2], [1.0; 2])?;
+            let one = surface.area()?;
+            area.value += one.value;
+            area.error += one.error;
+        }
+        area.error += f64::EPSILON * area.value * 4.0;
+        Ok(Self::placed(
+            frame.clone(),
+            Arc::new(Nets {
+                volumes,
+                cells,
+                faces,
+                moments,
+                about,
+                area,
+            }),
+        ))
+    }
+
+    fn placed(frame: Similarity, nets: Arc<Nets>) -> Self {
+        let extent = |k: usize, sign: f64| {
+            // A world direction in local coordinates.
+            let direction = DVec3::from_array([0, 1, 2].map(|i| frame.axis(i)[k])) * sign;
+            let reach = frame.scale_exact() * Dd::of(nets.faces.support(direction) * sign);
+            (frame.origin_exact()[k] + reach).f64()
+        };
+        let end = |sign: f64| DVec3::from_array([0, 1, 2].map(|k| extent(k, sign)));
+        let bounds = Aabb {
+            min: end(-1.0),
+            max: end(1.0),
+        };
+        Self {
+            margin: 1e-9 * bounds.longest_side(),
+            frame,
+            nets,
+            bounds,
+        }
+    }
+
+    pub(crate) fn frame(&self) -> &Similarity {
+        &self.frame
+    }
+
+    /// The volumes, in local coordinates of their frame.
+    #[must_use]
+    pub fn volumes(&self) -> &[NurbsVolume] {
+        &self.nets.volumes
+    }
+
+    /// The faces that bound the solid, in local coordinates.
+    pub(crate) fn faces(&self) -> &FaceSet {
+        &self.nets.faces
+    }
+
+    pub(super) fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Where a point comes from; `None` outside.
+    #[must_use]
+    pub fn invert(&self, point: DVec3) -> Option<Preimage> {
+        self.nets.cells.invert(self.frame.to_local(point).point)
+    }
+
+    pub(super) fn side(&self, point: DVec3) -> Side {
+        let margin = self.margin + 64.0 * f64::EPSILON * point.abs().max_element();
+        if !(point.cmpge(self.bounds.min - margin).all()
+            && point.cmple(self.bounds.max + margin).all())
+        {
+            return Side::Outside;
+        }
+        let local = self.frame.to_local(point);
+        let exact = || self.frame.to_local_exact(point);
+        self.nets.cells.side(local.point, local.error, exact)
+    }
+
+    pub(super) fn distance(&self, point: DVec3, _inside: bool, limit: f64) -> f64 {
+        let scale = self.frame.scale();
+        let limit_here = limit / scale;
+        let found = self.nets.faces.distance(self.frame.to_local(point).point, limit_here);
+        if found < limit_here {
+            found * scale
+        } else {
+            limit
+        }
+    }
+
+    pub(super) fn foot(&self, point: DVec3, _inside: bool) -> Option<DVec3> {
+        let found = self.nets.faces.nearest(self.frame.to_local(point).point)?;
+        Some(self.frame.to_world(found.foot))
+    }
+
+    pub(super) fn cuts(&self, row: &Row, cuts: &mut Cuts) {
+        let local = row.local(&self.frame);
+        #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
+        let range = [-1.0, row.count as f64];
+        let mut each = |a: f64, b: f64| cuts.add(a, b);
+        self.nets
+            .faces
+            .line(local.start, local.along, range, local.error, &mut each);
+    }
+
+    /// Faces that lie in a plane normal to the grid axis.
+    pub(super) fn flat_faces(&self, axis: usize) -> Vec<f64> {
+        let mut heights = Vec::new();
+        for face in self.nets.faces.faces() {
+            let points = face.surface.control_points().iter();
+            let world = points.map(|h| self.frame.to_world(DVec3::from_array(h.to_point()))[axis]);
+            let (low, high) =
+                world.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+            if high - low <= 1e-14 * self.bounds.longest_side() {
+                heights.push(0.5 * (low + high));
+            }
+        }
+        heights
+    }
+
+    pub(super) fn moments(&self) -> Moments {
+        let (frame, nets) = (&self.frame, &*self.nets);
+        let s = frame.scale();
+        let local = &nets.moments;
+        let axes = [0, 1, 2].map(|i| frame.axis(i));
+        let centre = DVec3::from_array(nets.about);
+        let about = frame.to_world(centre);
+        let exact: [Dd; 3] = std::array::from_fn(|k| {
+            let along = (0..3).map(|i| frame.axis_exact(i)[k] * Dd::of(centre[i]));
+            frame.origin_exact()[k] + frame.scale_exact() * along.fold(Dd::ZERO, |s, v| s + v)
+        });
+        let of = |value: f64, error: f64, size: f64| Integral {
+            value,
+            error: error + 16.0 * f64::EPSILON * size,
+        };
+        let volume = local.volume.value;
+        let first = std::array::from_fn(|k| {
+            let rest = (exact[k] - Dd::of(about[k])).f64();
+            let terms = |of: &dyn Fn(usize) -> f64| (0..3).map(of).sum::<f64>();
+            let value = terms(&|i| axes[i][k] * local.first[i].value);
+            let error = terms(&|i| axes[i][k].abs() * local.first[i].error);
+            let size = terms(&|i| axes[i][k].abs() * local.first[i].value.abs());
+            let shift = volume * s.powi(3) * rest;
+            let cubed = s.powi(4);
+            let own = of(value * cubed, error * cubed, size * cubed);
+            of(own.value + shift, own.error, shift.abs())
+        });
+        let second = std::array::from_fn(|k| {
+            std::array::from_fn(|l| {
+                let (mut value, mut error, mut size) = (0.0, 0.0, 0.0);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        let factor = axes[i][k] * axes[j][l];
+                        let m = local.second[i][j];
+                        value += factor * m.value;
+                        error += factor.abs() * m.error;
+                        size += factor.abs() * m.value.abs();
+                    }
+                }
+                let power = s.powi(5);
+                of(value * power, error * power, size * power)
+            })
+        });
+        Moments {
+            about,
+            volume: of(
+                volume * s.powi(3),
+                local.volume.error * s.powi(3),
+                volume * s.powi(3),
+            ),
+            area: of(
+                nets.area.value * s * s,
+                nets.area.error * s * s,
+                nets.area.value * s * s,
+            ),
+            first,
+            second,
+        }
+    }
+
+    pub(super) fn translated(&self, by: DVec3) -> Self {
+        Self::placed(self.frame.translated(by), self.nets.clone())
+    }
+
+    /// The outer faces: lines of constant first parameter.
+    pub(super) fn patches(&self, _seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
+        let faces = 0..self.nets.faces.faces().len();
+        let cuts = || (0..=8).map(|k| f64::from(k) / 8.0).collect();
+        faces.map(|number| (Patch::face(number), cuts())).collect()
+    }
+
+    pub(super) fn pace(&self, patch: Patch, t: f64) -> f64 {
+        let face = &self.nets.faces.faces()[patch.number].surface;
+        let along = [0.0, 0.5, 1.0].map(|v| {
+            let slopes = face.derivatives([t, v]).map(|d| DVec3::from_array(d.first[0]));
+            slopes.map_or(0.0, DVec3::length)
+        });
+        along.into_iter().fold(0.0, f64::max) * self.frame.scale()
+    }
+
+    /// The curve of constant first parameter on a face.
+    pub(super) fn rule(&self, patch: Patch, t: f64, hair: f64) -> Option<Rule> {
+        let face = &self.nets.faces.faces()[patch.number];
+        let line = FaceLine::new(&self.frame, &face.surface, t)?;
+        if line.length() <= 2.0 * hair {
+            return None;
+        }
+        let outward = f64::from(face.outward);
+        let line = Arc::new(line);
+        let path = |off: f64| Path::Face {
+            line: line.clone(),
+            off: off * outward,
+        };
+        Some(Rule {
+            path: path(0.0),
+            beside: [path(hair), path(-hair)],
+            range: [0.0, 1.0],
+            normal: Normal::Face {
+                line: line.clone(),
+                sign: outward,
+            },
+            area: Area::OfNormal,
+        })
+    }
+}
+
+fn add(sum: &mut MapMoments, one: &MapMoments) {
+    let added = |a: Integral, b: Integral| Integral {
+        value: a.value + b.value,
+        error: a.error + b.error + f64::EPSILON * (a.value + b.value).abs(),
+    };
+    sum.volume = added(sum.volume, one.volume);
+    for i in 0..3 {
+        sum.first[i] = added(sum.first[i], one.first[i]);
+        for j in 0..3 {
+            sum.second[i][j] = added(sum.second[i][j], one.second[i][j]);
+        }
+    }
+}
+
+/// A line of constant first parameter on a rational patch, in the world, with what moves it along
+/// the normal: the homogeneous curves of the point and of its slope across the line.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FaceLine {
+    /// (w x, w) of the points, from a common origin.
+    points: SmallVec<[[f64; 4]; 8]>,
+    /// Derivatives of these by the first parameter.
+    slopes: SmallVec<[[f64; 4]; 8]>,
+    origin: DVec3,
+}
+
+impl FaceLine {
+    fn new(frame: &Similarity, cell: &BezierCell<2>, t: f64) -> Option<Self> {
+        let [p, q] = cell.degrees();
+        let first = cell.control_points().first()?.to_point();
+        let origin = frame.to_world(DVec3::from_array(first));
+        let s = frame.scale();
+        let axes = [0, 1, 2].map(|i| frame.axis(i) * s);
+        let placed = |j: usize, i: usize| -> [f64; 4] {
+            let h = cell.control_points()[j * (p + 1) + i];
+            let d: [f64; 3] = std::array::from_fn(|k| h.weighted[k] - h.weight * first[k]);
+            let v = axes[0] * d[0] + axes[1] * d[1] + axes[2] * d[2];
+            [v.x, v.y, v.z, h.weight]
+        };
+        let (mut points, mut slopes) = (SmallVec::new(), SmallVec::new());
+        for j in 0..=q {
+            let mut row: SmallVec<[[f64; 4]; 8]> = (0..=p).map(|i| placed(j, i)).collect();
+            for level in (1..=p).rev() {
+                if level == 1 {
+                    #[allow(clippy::cast_precision_loss, reason = "a degree")]
+                    let degree = p as f64;
+                    slopes.push(std::array::from_fn(|c| degree * (row[1][c] - row[0][c])));
+                }
+                for i in 0..level {
+                    row[i] = mix(row[i], row[i + 1], t);
+                }
+            }
+            points.push(row[0]);
+        }
+        Some(Self {
+            points,
+            slopes,
+            origin,
+        })
+    }
+
+    /// Point, slope across the line and slope along it, at `s`.
+    fn frame(&self, s: f64) -> [DVec3; 3] {
+        let (h, along) = casteljau(&self.points, s);
+        let (across, _) = casteljau(&self.slopes, s);
+        let w = h[3];
+        let x = xyz(h) / w;
+        [
+            x + self.origin,
+            (xyz(across) - x * across[3]) / w,
+            (xyz(along) - x * along[3]) / w,
+        ]
+    }
+
+    /// The point moved by `off` along the unit normal across × along.
+    pub(super) fn at(&self, s: f64, off: f64) -> DVec3 {
+        if off == 0.0 {
+            let (h, _) = casteljau(&self.points, s);
+            return xyz(h) / h[3] + self.origin;
+        }
+        let [x, across, along] = self.frame(s);
+        x + across.cross(along).normalize_or_zero() * off
+    }
+
+    /// The normal across × along, its length the area per unit of both parameters.
+    pub(super) fn normal(&self, s: f64) -> DVec3 {
+        let [_, across, along] = self.frame(s);
+        across.cross(along)
+    }
+
+    /// A bound on the length per unit of the parameter.
+    pub(super) fn speed(&self) -> f64 {
+        // |x'| <= p max |P_{j+1} - P_j| (w_max / w_min)²: G. Farin's bound for rational curves.
+        let weights = self.points.iter().map(|h| h[3]);
+        let (low, high) =
+            weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
+        let at = |h: &[f64; 4]| xyz(*h) / h[3];
+        let steps = self.points.windows(2).map(|w| (at(&w[1]) - at(&w[0])).length());
+        #[allow(clippy::cast_precision_loss, reason = "a degree")]
+        let degree = (self.points.len() - 1) as f64;
+        degree * steps.fold(0.0, f64::max) * (high / low).powi(2)
+    }
+
+    /// The largest `direction · x` that control points reach: a bound.
+    pub(super) fn reach(&self, direction: DVec3) -> f64 {
+        let heights = self.points.iter().map(|h| direction.dot(xyz(*h) / h[3]));
+        heights.fold(f64::NEG_INFINITY, f64::max) + direction.dot(self.origin)
+    }
+
+    /// Length of the control polygon.
+    fn length(&self) -> f64 {
+        let at = |h: &[f64; 4]| xyz(*h) / h[3];
+        self.points.windows(2).map(|w| (at(&w[1]) - at(&w[0])).length()).sum()
+    }
+}
+
+fn xyz(h: [f64; 4]) -> DVec3 {
+    DVec3::new(h[0], h[1], h[2])
+}
+
+fn mix(a: [f64; 4], b: [f64; 4], t: f64) -> [f64; 4] {
+    std::array::from_fn(|c| a[c] * (1.0 - t) + b[c] * t)
+}
+
+/// Value and derivative of a homogeneous Bézier curve.
+fn casteljau(points: &[[f64; 4]], s: f64) -> ([f64; 4], [f64; 4]) {
+    let mut row: SmallVec<[[f64; 4]; 8]> = SmallVec::from_slice(points);
+    let degree = row.len() - 1;
+    let mut slope = [0.0; 4];
+    for level in (1..=degree).rev() {
+        if level == 1 {
+            #[allow(clippy::cast_precision_loss, reason = "a degree")]
+            let factor = degree as f64;
+            slope = std::array::from_fn(|c| factor * (row[1][c] - row[0][c]));
+        }
+        for i in 0..level {
+            row[i] = mix(row[i], row[i + 1], s);
+        }
+    }
+    (row[0], slope)
+}
