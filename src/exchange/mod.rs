@@ -364,18 +364,18 @@ where
     Ok(())
 }
 
-/// Writes volumes; see [`write`].
+/// Writes volumes; see [`write()`].
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn write_volumes(path: impl AsRef<Path>, volumes: &[NurbsVolume]) -> Result<(), ExchangeError> {
     write(path, volumes)
 }
 
-/// Writes surfaces; see [`write`].
+/// Writes surfaces; see [`write()`].
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn write_surfaces(
     path: impl AsRef<Path>,
     surfaces: &[NurbsSurface],
@@ -383,10 +383,10 @@ pub fn write_surfaces(
     write(path, surfaces)
 }
 
-/// Writes curves; see [`write`].
+/// Writes curves; see [`write()`].
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn write_curves(path: impl AsRef<Path>, curves: &[NurbsCurve<3>]) -> Result<(), ExchangeError> {
     write(path, curves)
 }
