@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Rational points are premultiplied: (w x, w y, w z, w). On reading each is divided by its weight;
-//! [`write`] gives a coordinate back exactly or one step of f64 beside it. The n numbers that end a
+//! [`write()`] gives a coordinate back exactly or one step of f64 beside it. The n numbers that end a
 //! header (a colour) are passed over. Other classes are refused by name.
 //!
 //! A file with Cartesian points and weights has the same form as one with premultiplied points. Where

@@ -27,7 +27,7 @@
 //! `super::mfem_space`. In the first the topology adds nothing to the geometry; it is read and
 //! checked for its form alone. Comments run from `#` to the end of the line.
 //!
-//! [`write`] gives the first dialect with Cartesian points, so that all numbers read back bit for bit.
+//! [`write()`] gives the first dialect with Cartesian points, so that all numbers read back bit for bit.
 //!
 //! * Units: those of the file.
 //! * Limits: meshes that are periodic by identified boundaries, not conforming, or have inactive

@@ -163,12 +163,13 @@ impl Reading {
     fn only<T>(
         self,
         wanted: &str,
-        pick: impl Fn(Spline) -> Result<T, Spline>,
+        pick: impl Fn(Spline) -> Option<T>,
     ) -> Result<Vec<T>, ExchangeError> {
         let picked = self.splines.into_iter().enumerate().map(|(index, spline)| {
-            pick(spline).map_err(|other| ExchangeError::Unexpected {
+            let kind = spline.kind();
+            pick(spline).ok_or_else(|| ExchangeError::Unexpected {
                 place: Place::Spline(index),
-                found: format!("a {}", other.kind()),
+                found: format!("a {kind}"),
                 wanted: format!("a {wanted}; read every kind at once, or split the file"),
             })
         });
@@ -285,7 +286,7 @@ fn decode(bytes: &[u8]) -> Result<&str, ExchangeError> {
 fn read_only<T>(
     path: &Path,
     wanted: &str,
-    pick: impl Fn(Spline) -> Result<T, Spline>,
+    pick: impl Fn(Spline) -> Option<T>,
 ) -> Result<Vec<T>, ExchangeError> {
     let reading = read(path)?;
     for note in &reading.notes {
@@ -314,8 +315,8 @@ fn read_only<T>(
 /// ```
 pub fn read_volumes(path: impl AsRef<Path>) -> Result<Vec<NurbsVolume>, ExchangeError> {
     read_only(path.as_ref(), "volume", |spline| match spline {
-        Spline::Volume(volume) => Ok(volume),
-        other => Err(other),
+        Spline::Volume(volume) => Some(volume),
+        _ => None,
     })
 }
 
@@ -325,8 +326,8 @@ pub fn read_volumes(path: impl AsRef<Path>) -> Result<Vec<NurbsVolume>, Exchange
 /// Those of [`read`]; [`ExchangeError::Unexpected`] where a spline is no surface.
 pub fn read_surfaces(path: impl AsRef<Path>) -> Result<Vec<NurbsSurface>, ExchangeError> {
     read_only(path.as_ref(), "surface", |spline| match spline {
-        Spline::Surface(surface) => Ok(surface),
-        other => Err(other),
+        Spline::Surface(surface) => Some(surface),
+        _ => None,
     })
 }
 
@@ -336,8 +337,8 @@ pub fn read_surfaces(path: impl AsRef<Path>) -> Result<Vec<NurbsSurface>, Exchan
 /// Those of [`read`]; [`ExchangeError::Unexpected`] where a spline is no curve.
 pub fn read_curves(path: impl AsRef<Path>) -> Result<Vec<NurbsCurve<3>>, ExchangeError> {
     read_only(path.as_ref(), "curve", |spline| match spline {
-        Spline::Curve(curve) => Ok(curve),
-        other => Err(other),
+        Spline::Curve(curve) => Some(curve),
+        _ => None,
     })
 }
 
@@ -363,18 +364,18 @@ where
     Ok(())
 }
 
-/// Writes volumes; see [`write`].
+/// Writes volumes; see [`write()`].
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn write_volumes(path: impl AsRef<Path>, volumes: &[NurbsVolume]) -> Result<(), ExchangeError> {
     write(path, volumes)
 }
 
-/// Writes surfaces; see [`write`].
+/// Writes surfaces; see [`write()`].
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn write_surfaces(
     path: impl AsRef<Path>,
     surfaces: &[NurbsSurface],
@@ -382,10 +383,10 @@ pub fn write_surfaces(
     write(path, surfaces)
 }
 
-/// Writes curves; see [`write`].
+/// Writes curves; see [`write()`].
 ///
 /// # Errors
-/// Those of [`write`].
+/// Those of [`write()`].
 pub fn write_curves(path: impl AsRef<Path>, curves: &[NurbsCurve<3>]) -> Result<(), ExchangeError> {
     write(path, curves)
 }
