@@ -101,8 +101,8 @@ impl AxisFrame {
         Self::checked(Self::from(&frame))
     }
 
-    /// The frame with the axis along `direction`, which need not be a unit vector, completed by
-    /// form (ii) of the [module](self).
+    /// The frame with the axis along `direction`, which need not be a unit vector, completed
+    /// without a choice of component: e1 = (1 + σ x² a, σ x y a, -σ x) with σ the sign of z, a = -1 / (σ + z).
     ///
     /// # Errors
     /// [`ConstructError::Frame`].
@@ -110,7 +110,8 @@ impl AxisFrame {
         Self::completed(origin, direction, branch_free)
     }
 
-    /// As [`from_direction`](Self::from_direction), completed by form (i).
+    /// As [`from_direction`](Self::from_direction), with e1 the coordinate axis of the direction's smallest
+    /// component, projected.
     ///
     /// # Errors
     /// [`ConstructError::Frame`].
