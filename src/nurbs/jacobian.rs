@@ -28,8 +28,8 @@
 //!   p, q, r: a tenth of a millisecond for (3, 2, 2), seconds for (12, 12, 12).
 //! * Source: Farouki, Rajan, CAGD 5 (1988), §4.3 (products).
 
-use super::net::{Net, indices, map_rows, place, window};
 use super::Homogeneous;
+use super::net::{Net, indices, map_rows, place, window};
 use crate::math::bernstein::binomials;
 use crate::math::tolerance::gamma;
 
@@ -110,7 +110,8 @@ impl Expansion {
         let mut shorter = counts;
         shorter[0] -= 1;
         let [low, high] = [0, 1].map(|first| {
-            (entries.each_ref()).map(|e| binomial_form(&(shorter, window(counts, e, [first, 0, 0], shorter))))
+            (entries.each_ref())
+                .map(|e| binomial_form(&(shorter, window(counts, e, [first, 0, 0], shorter))))
         });
         let [along_v, along_w] = [1, 2].map(|k| {
             let p = (counts[k] - 1) as f64;
@@ -277,12 +278,7 @@ fn product_room(a: &Net<Bounded, 3>, b: &Net<Bounded, 3>) -> Net<Bounded, 3> {
 }
 
 /// Adds `sign` a b, all in binomial form: a convolution.
-fn add_product(
-    total: &mut Net<Bounded, 3>,
-    a: &Net<Bounded, 3>,
-    b: &Net<Bounded, 3>,
-    sign: f64,
-) {
+fn add_product(total: &mut Net<Bounded, 3>, a: &Net<Bounded, 3>, b: &Net<Bounded, 3>, sign: f64) {
     let [row, depth] = [b.0[0], b.0[1]];
     for (index, x) in indices(a.0).zip(&a.1) {
         if x.bound == 0.0 {

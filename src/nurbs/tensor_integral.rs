@@ -51,7 +51,7 @@ const AGREEMENT: f64 = 2e-15;
 const ROUNDING: f64 = 32.0 * U;
 
 /// Points of one cell, at most; about a second's work.
-const POINTS: usize = 4_000_000;
+const POINTS: usize = 2_000_000;
 
 /// Nodes and weights on [0, 1] of each of the [`ORDERS`].
 static RULES: LazyLock<Vec<Vec<(f64, f64)>>> = LazyLock::new(|| {
@@ -134,7 +134,11 @@ impl NurbsVolume {
                 total.add(part);
             }
         }
-        let sign = if total[0].value.f64() < 0.0 { -1.0 } else { 1.0 };
+        let sign = if total[0].value.f64() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         let value = |i: usize| Integral {
             value: sign * total[i].value.f64(),
             error: total[i].error,
@@ -248,7 +252,10 @@ fn shifted(part: &[Integral; 10], shift: [f64; 3]) -> [Integral; 10] {
 ///
 /// * `integrand`: from A, w and their derivatives, the K values and what their rounding is relative
 ///   to.
-#[allow(clippy::type_complexity, reason = "an origin and K integrals for each cell")]
+#[allow(
+    clippy::type_complexity,
+    reason = "an origin and K integrals for each cell"
+)]
 fn integrate_cells<const N: usize, const K: usize>(
     map: &NurbsTensor<N>,
     integrand: impl Fn(Homogeneous<3>, &[Homogeneous<3>; N]) -> ([f64; K], [f64; K]) + Sync,
@@ -320,7 +327,9 @@ where
         let mut panels = vec![panel([0.0; N], [1.0; N])];
         let excess = |errors: &[f64; K]| {
             let shares = errors.iter().zip(&tolerances);
-            shares.fold(0.0_f64, |m, (e, t)| m.max(if *e > *t { e / t } else { 0.0 }))
+            shares.fold(0.0_f64, |m, (e, t)| {
+                m.max(if *e > *t { e / t } else { 0.0 })
+            })
         };
         loop {
             let mut errors = [0.0; K];
@@ -490,10 +499,299 @@ fn bernstein(p: usize, t: f64) -> (Vec<f64>, Vec<f64>) {
         let lower = values;
         let at = |i: usize| lower.get(i).copied().unwrap_or(0.0);
         let before = |i: usize| i.checked_sub(1).map_or(0.0, at);
-        values = (0..=degree).map(|i| (1.0 - t) * at(i) + t * before(i)).collect();
+        values = (0..=degree)
+            .map(|i| (1.0 - t) * at(i) + t * before(i))
+            .collect();
         if degree == p {
             slopes = (0..=p).map(|i| p as f64 * (before(i) - at(i))).collect();
         }
     }
     (values, slopes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::KnotVector;
+    use super::super::net::indices;
+    use super::super::tensor_testing::{biquadratic, maps, octant, polar, sphere, torus, turned};
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    /// A value against the exact one: within its estimate, which is at most `relative` of `scale`.
+    fn check(name: &str, found: Integral, exact: f64, scale: f64, relative: f64) {
+        let off = (found.value - exact).abs();
+        assert!(
+            off <= found.error && found.error <= relative * scale,
+            "{name}: {} for {exact}, off by {:e} of {scale}, estimate {:e}",
+            found.value,
+            off / scale,
+            found.error / scale
+        );
+    }
+
+    fn line() -> KnotVector {
+        KnotVector::bezier(1).expect("valid")
+    }
+
+    #[test]
+    fn solids_of_revolution_in_closed_form() {
+        let (r, h) = (2.0, 5.0);
+        for disc in [biquadratic(), polar()] {
+            let cylinder = turned(&line(), &[([r, 0.0], 1.0), ([r, h], 1.0)], &disc);
+            let found = cylinder.moments().expect("finite");
+            let volume = PI * r * r * h;
+            check("cylinder", found.volume, volume, volume, 1e-13);
+            check("x", found.first[0], 0.0, volume * r, 1e-13);
+            check("z", found.first[2], volume * h / 2.0, volume * h, 1e-13);
+            check(
+                "xx",
+                found.second[0][0],
+                volume * r * r / 4.0,
+                volume * h * h,
+                1e-13,
+            );
+            check("xy", found.second[0][1], 0.0, volume * h * h, 1e-13);
+            check(
+                "zz",
+                found.second[2][2],
+                volume * h * h / 3.0,
+                volume * h * h,
+                1e-13,
+            );
+            assert_eq!(found.second[0][2], found.second[2][0]);
+
+            let cone = turned(&line(), &[([r, 0.0], 1.0), ([0.0, h], 1.0)], &disc);
+            let found = cone.moments().expect("finite");
+            let volume = PI * r * r * h / 3.0;
+            check("cone", found.volume, volume, volume, 1e-13);
+            check("z", found.first[2], volume * h / 4.0, volume * h, 1e-13);
+            check(
+                "xx",
+                found.second[0][0],
+                PI * r.powi(4) * h / 20.0,
+                volume * h * h,
+                1e-13,
+            );
+
+            let radius: f64 = 1.5;
+            let ball = sphere(radius, &disc);
+            let volume = 4.0 * PI * radius.powi(3) / 3.0;
+            for ball in [&ball, &ball.reverse(2).expect("valid")] {
+                let found = ball.moments().expect("finite");
+                check("ball", found.volume, volume, volume, 1e-13);
+                for i in 0..3 {
+                    let exact = volume * radius * radius / 5.0;
+                    check(
+                        "xx",
+                        found.second[i][i],
+                        exact,
+                        volume * radius * radius,
+                        1e-13,
+                    );
+                }
+            }
+            // The six faces: two points, and the rim of the disc; its whole is the sphere.
+            let faces = ball.boundary().expect("finite");
+            let area = faces.map(|face| face.area().expect("finite"));
+            let sum = area.iter().fold(Integral::default(), |sum, face| Integral {
+                value: sum.value + face.value,
+                error: sum.error + face.error,
+            });
+            // The polar disc's seam, twice a half disc, counts too.
+            let polar = area[4].value + area[5].value > 0.1 && disc.points.len() > 9;
+            let seam = if polar { PI * radius * radius } else { 0.0 };
+            let exact = 4.0 * PI * radius * radius + seam;
+            check("sphere", sum, exact, exact, 1e-11);
+        }
+        let (big, small) = (3.0_f64, 1.0_f64);
+        let found = torus(big, small).moments().expect("finite");
+        let volume = 2.0 * PI * PI * big * small * small;
+        check("torus", found.volume, volume, volume, 1e-13);
+        let axial = Integral {
+            value: found.second[0][0].value + found.second[1][1].value,
+            error: found.second[0][0].error + found.second[1][1].error,
+        };
+        let exact = volume * (big * big + 0.75 * small * small);
+        check("torus about its axis", axial, exact, volume * 16.0, 1e-13);
+        let area = torus(big, small)
+            .boundary()
+            .expect("finite")
+            .map(|f| f.area().expect("finite"));
+        let sum = area[..4]
+            .iter()
+            .fold(Integral::default(), |sum, f| Integral {
+                value: sum.value + f.value,
+                error: sum.error + f.error,
+            });
+        let exact = 4.0 * PI * PI * big * small;
+        check("torus area", sum, exact, exact, 1e-12);
+        check(
+            "octant",
+            octant().area().expect("finite"),
+            PI / 2.0,
+            PI / 2.0,
+            1e-12,
+        );
+    }
+
+    #[test]
+    fn a_ring_far_away_keeps_its_digits() {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        // The control points themselves are rounded to 1.2e-10 out there, a 2e-10th of the radius.
+        let (big, small) = (1e6, 0.5);
+        let found = torus(big, small).moments().expect("finite");
+        let volume = 2.0 * PI * PI * big * small * small;
+        let off = (found.volume.value - volume).abs() / volume;
+        assert!(off < 1e-9, "{off:e}");
+        // A block with exact corners: here nothing is lost at all.
+        let corner = |i: u32| {
+            [
+                f64::from(i & 1),
+                f64::from(i >> 1 & 1) * 2.0,
+                f64::from(i >> 2),
+            ]
+        };
+        let brick = NurbsVolume::new(
+            [line(), line(), line()],
+            (0..8).map(corner).collect(),
+            vec![1.0; 8],
+        )
+        .expect("valid")
+        .transform(&identity, &[1e6, -2e6, 0.5])
+        .expect("finite");
+        let found = brick
+            .moments_about([1e6 + 0.5, -2e6 + 1.0, 1.0])
+            .expect("finite");
+        check("volume", found.volume, 2.0, 2.0, 1e-13);
+        check("x", found.first[0], 0.0, 2.0, 1e-13);
+        check("yy", found.second[1][1], 2.0 / 3.0, 1.0, 1e-12);
+        let found = brick.moments().expect("finite");
+        check(
+            "x about the origin",
+            found.first[0],
+            2.0 * (1e6 + 0.5),
+            2e6,
+            1e-13,
+        );
+        let exact = 2.0 * ((1e6 + 0.5) * (1e6 + 0.5) + 1.0 / 12.0);
+        check(
+            "xx about the origin",
+            found.second[0][0],
+            exact,
+            exact,
+            1e-13,
+        );
+    }
+
+    #[test]
+    fn hard_weights_and_folded_signs() {
+        // A block whose weights differ ten-thousandfold is still the block: x = w u / ((1 - u) + w u).
+        let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)];
+        let weights = (0..8).map(|i| if i & 1 == 1 { 1e4 } else { 1.0 }).collect();
+        let cube = NurbsVolume::new(
+            [line(), line(), line()],
+            (0..8).map(corner).collect(),
+            weights,
+        )
+        .expect("valid");
+        let found = cube.moments().expect("finite");
+        check("volume", found.volume, 1.0, 1.0, 1e-11);
+        check("xx", found.second[0][0], 1.0 / 3.0, 1.0, 1e-11);
+        let mirrored = cube.permute([1, 0, 2]).expect("a permutation");
+        assert!(mirrored.jacobian([0.5; 3]).expect("inside").determinant < 0.0);
+        check(
+            "mirrored",
+            mirrored.moments().expect("finite").volume,
+            1.0,
+            1.0,
+            1e-11,
+        );
+    }
+
+    #[test]
+    fn areas_with_corners_and_tips() {
+        // A flat disc, whose corners have parallel tangents, and a polar one with a collapsed edge.
+        for disc in [biquadratic(), polar()] {
+            let points = disc
+                .points
+                .iter()
+                .map(|&([x, y], _)| [3.0 * x, 3.0 * y, 1.0])
+                .collect();
+            let weights = disc.points.iter().map(|&(_, w)| w).collect();
+            let surface = NurbsSurface::new(disc.knots, points, weights).expect("valid");
+            check(
+                "disc",
+                surface.area().expect("finite"),
+                9.0 * PI,
+                9.0 * PI,
+                1e-12,
+            );
+        }
+        // A folded strip: |J| has a crease inside, x = 4 u (1 - u) twice over [0, 1].
+        let points = vec![
+            [0.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [2.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ];
+        let strip = NurbsSurface::new(
+            [KnotVector::bezier(2).expect("valid"), line()],
+            points,
+            vec![1.0; 6],
+        )
+        .expect("valid");
+        check("strip", strip.area().expect("finite"), 2.0, 2.0, 1e-11);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(6))]
+
+        #[test]
+        fn moments_follow_affine_maps(map in maps::<3>()) {
+            // Weights that differ a hundredfold from one control point to the next take their time.
+            prop_assume!(map.knots().iter().map(|k| k.spans().count()).product::<usize>() <= 3);
+            let whole = map.moments().expect("finite");
+            let matrix = [[2.0, 0.5, 0.0], [0.0, 1.0, -0.25], [1.0, 0.0, 1.5]];
+            let image = map.transform(&matrix, &[0.0; 3]).expect("finite").moments().expect("finite");
+            let determinant = 2.0 * 1.5 - 0.5 * 0.25;
+            let expected = whole.volume.value * determinant;
+            let error = whole.volume.error * determinant + image.volume.error;
+            prop_assert!((image.volume.value - expected).abs() <= error,
+                "{} for {expected}, {error:e}", image.volume.value);
+            let expected = (0..3).map(|i| matrix[1][i] * whole.first[i].value).sum::<f64>() * determinant;
+            let error: f64 = (0..3).map(|i| 2.0 * whole.first[i].error * determinant).sum::<f64>()
+                + image.first[1].error;
+            prop_assert!((image.first[1].value - expected).abs() <= error,
+                "{} for {expected}, {error:e}", image.first[1].value);
+        }
+    }
+
+    #[test]
+    fn a_polynomial_map_is_integrated_exactly() {
+        // x = u, y = v + u², z = w + u v: volume 1, ∭ z = ∫ w + u v = 3/4, ∭ y² = ∭ (v + u²)².
+        let quadratic = || KnotVector::bezier(2).expect("valid");
+        let square = [0.0, 0.0, 1.0];
+        let half = |i: usize| i as f64 / 2.0;
+        let points = indices([3, 3, 2])
+            .map(|[i, j, k]| [half(i), half(j) + square[i], k as f64 + half(i) * half(j)]);
+        let map = NurbsVolume::new(
+            [quadratic(), quadratic(), line()],
+            points.collect(),
+            vec![0.7; 18],
+        )
+        .expect("valid");
+        let found = map.moments().expect("finite");
+        check("volume", found.volume, 1.0, 1.0, 1e-13);
+        check("z", found.first[2], 0.75, 1.0, 1e-13);
+        check(
+            "yy",
+            found.second[1][1],
+            1.0 / 3.0 + 1.0 / 3.0 + 0.2,
+            2.0,
+            1e-13,
+        );
+    }
 }
