@@ -24,7 +24,7 @@
 //!   tensor_refine        other nets for the same map; affine and projective images
 //!   tensor_bezier        Bézier cells; the six faces of a volume
 //!   tensor_grid          all points of a grid of parameters
-//!   tensor_integral      volume, moments and area
+//!   tensor_integral      volume, moments and area (cell_quadrature)
 //!   cell                 one polynomial piece of a map
 //!   orientation          the certified sign of the Jacobian determinant (jacobian)
 //!   net                  what is done to a net of control points row by row
@@ -74,6 +74,7 @@ mod basis;
 mod bezier;
 mod cache;
 mod cell;
+mod cell_quadrature;
 mod curve;
 mod error;
 mod homogeneous;
