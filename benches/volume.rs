@@ -45,7 +45,11 @@ fn volume() -> NurbsVolume {
     let net = || (0..5).flat_map(|k| (0..6).flat_map(move |j| (0..7).map(move |i| [i, j, k])));
     let points = net().map(|index| {
         let [x, y, z] = index.map(f64::from);
-        [x + 0.1 * (y * z).sin(), y + 0.2 * (x + z).cos(), z - 0.1 * (x * y).cos()]
+        [
+            x + 0.1 * (y * z).sin(),
+            y + 0.2 * (x + z).cos(),
+            z - 0.1 * (x * y).cos(),
+        ]
     });
     let weights = net().map(|[i, j, k]| 1.0 + 0.4 * f64::from(3 * i + 5 * j + 7 * k).sin());
     NurbsVolume::new(knots, points.collect(), weights.collect()).expect("valid")

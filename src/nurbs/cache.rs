@@ -53,9 +53,11 @@ pub struct BasisTable {
 
 /// Neighbouring samples of one span.
 #[derive(Debug, Clone)]
-struct Run {
-    span: usize,
-    window: Range<usize>,
+pub(super) struct Run {
+    /// The span.
+    pub(super) span: usize,
+    /// The samples.
+    pub(super) window: Range<usize>,
 }
 
 impl BasisTable {
@@ -170,8 +172,18 @@ impl BasisTable {
         })
     }
 
+    /// The runs of samples of one span, in order; they hold all samples.
+    pub(super) fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// From a row to the next in [`rows`](Self::rows).
+    pub(super) fn stride(&self) -> usize {
+        self.stride
+    }
+
     /// All rows of one order.
-    fn rows(&self, order: usize) -> &[f64] {
+    pub(super) fn rows(&self, order: usize) -> &[f64] {
         let height = (self.knots.degree() + 1) * self.stride;
         &self.values[self.offset + order * height..][..height]
     }

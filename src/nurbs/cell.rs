@@ -18,9 +18,7 @@ use super::curve::bounds;
 use super::knot_vector::check_degree;
 use super::net::{map_rows, window};
 use super::tensor_derivatives::derivatives;
-use super::{
-    Homogeneous, KnotVector, NurbsError, NurbsTensor, RationalBezier, TensorDerivatives,
-};
+use super::{Homogeneous, KnotVector, NurbsError, NurbsTensor, RationalBezier, TensorDerivatives};
 
 /// A rational Bézier map of N parameters, each in [0, 1], into space.
 ///
@@ -246,11 +244,7 @@ impl<const N: usize> BezierCell<N> {
     ///
     /// # Errors
     /// [`NurbsError::Interval`] unless `start < end`, and those of [`KnotVector::reparametrized`].
-    pub fn to_spline(
-        &self,
-        start: [f64; N],
-        end: [f64; N],
-    ) -> Result<NurbsTensor<N>, NurbsError> {
+    pub fn to_spline(&self, start: [f64; N], end: [f64; N]) -> Result<NurbsTensor<N>, NurbsError> {
         let mut knots = Vec::with_capacity(N);
         for k in 0..N {
             let unit = KnotVector::bezier(self.degrees[k])?;

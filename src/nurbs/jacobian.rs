@@ -28,8 +28,8 @@
 //!   p, q, r: a tenth of a millisecond for (3, 2, 2), seconds for (12, 12, 12).
 //! * Source: Farouki, Rajan, CAGD 5 (1988), §4.3 (products).
 
-use super::net::{Net, indices, map_rows, place, window};
 use super::Homogeneous;
+use super::net::{Net, indices, map_rows, place, window};
 use crate::math::bernstein::binomials;
 use crate::math::tolerance::gamma;
 
@@ -110,7 +110,8 @@ impl Expansion {
         let mut shorter = counts;
         shorter[0] -= 1;
         let [low, high] = [0, 1].map(|first| {
-            (entries.each_ref()).map(|e| binomial_form(&(shorter, window(counts, e, [first, 0, 0], shorter))))
+            (entries.each_ref())
+                .map(|e| binomial_form(&(shorter, window(counts, e, [first, 0, 0], shorter))))
         });
         let [along_v, along_w] = [1, 2].map(|k| {
             let p = (counts[k] - 1) as f64;
@@ -277,12 +278,7 @@ fn product_room(a: &Net<Bounded, 3>, b: &Net<Bounded, 3>) -> Net<Bounded, 3> {
 }
 
 /// Adds `sign` a b, all in binomial form: a convolution.
-fn add_product(
-    total: &mut Net<Bounded, 3>,
-    a: &Net<Bounded, 3>,
-    b: &Net<Bounded, 3>,
-    sign: f64,
-) {
+fn add_product(total: &mut Net<Bounded, 3>, a: &Net<Bounded, 3>, b: &Net<Bounded, 3>, sign: f64) {
     let [row, depth] = [b.0[0], b.0[1]];
     for (index, x) in indices(a.0).zip(&a.1) {
         if x.bound == 0.0 {
@@ -297,5 +293,119 @@ fn add_product(
                 to.bound += bound * y.bound;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::BezierCell;
+    use super::super::tensor_testing::maps;
+    use super::*;
+    use crate::math::dd::{Dd, Real};
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn the_expansion_is_the_determinant(map in maps::<3>(), t in prop::array::uniform3(0.0..=1.0_f64)) {
+            let cell = map.to_bezier().expect("finite").swap_remove(0).cell;
+            let net = CellNet {
+                counts: cell.counts(),
+                values: cell.control_points().to_vec(),
+                bounds: cell.control_points().iter().map(|h| Homogeneous {
+                    weighted: h.weighted.map(f64::abs), weight: h.weight,
+                }).collect(),
+                roundings: 0.0,
+            };
+            let expansion = Expansion::of_jacobian(&net);
+            let degrees = cell.degrees();
+            prop_assert_eq!(expansion.counts, [4 * degrees[0] - 1, 4 * degrees[1], 4 * degrees[2]]);
+            // The same cell in double-double, by de Casteljau; the factor of the scales is free,
+            // so ratios to the value at one corner of a box are compared.
+            let value = |t: [f64; 3]| -> (f64, f64) {
+                let (mut value, mut bound) = (Dd::ZERO, 0.0);
+                for (index, c) in indices(expansion.counts).zip(&expansion.coefficients) {
+                    let mut factor = Dd::ONE;
+                    for k in 0..3 {
+                        let p = expansion.counts[k] - 1;
+                        let row = crate::math::bernstein::binomials::<Dd>(p);
+                        factor = factor * row[index[k]];
+                        for _ in 0..index[k] { factor = factor * Dd::of(t[k]); }
+                        for _ in index[k]..p { factor = factor * (Dd::ONE - Dd::of(t[k])); }
+                    }
+                    value = value + factor * Dd::of(c.value);
+                    bound += factor.f64() * expansion.noise(*c);
+                }
+                (value.f64(), bound)
+            };
+            let exact = |t: [f64; 3]| determinant_in_dd(&cell, t);
+            let [a, b] = [t, [0.5; 3]];
+            let ((va, na), (vb, nb)) = (value(a), value(b));
+            let (ea, eb) = (exact(a), exact(b));
+            // va / vb = ea / eb, each within its noise.
+            let left = va * eb - vb * ea;
+            prop_assert!(left.abs() <= na * eb.abs() + nb * ea.abs() + 1e-14 * (va * eb).abs(),
+                "{va} {vb} {ea} {eb}");
+        }
+    }
+
+    /// The determinant of a cell at t, all in double-double.
+    fn determinant_in_dd(cell: &BezierCell<3>, t: [f64; 3]) -> f64 {
+        let counts = cell.counts();
+        let basis = |k: usize, derived: bool| -> Vec<Dd> {
+            let p = counts[k] - 1;
+            let u = Dd::of(t[k]);
+            let bernstein = |q: usize, i: usize| {
+                let mut value = crate::math::bernstein::binomials::<Dd>(q)[i];
+                for _ in 0..i {
+                    value = value * u;
+                }
+                for _ in i..q {
+                    value = value * (Dd::ONE - u);
+                }
+                value
+            };
+            (0..=p)
+                .map(|i| {
+                    if !derived {
+                        return bernstein(p, i);
+                    }
+                    let low = if i > 0 {
+                        bernstein(p - 1, i - 1)
+                    } else {
+                        Dd::ZERO
+                    };
+                    let high = if i < p { bernstein(p - 1, i) } else { Dd::ZERO };
+                    Dd::of(p as f64) * (low - high)
+                })
+                .collect()
+        };
+        let row = |which: usize| -> [Dd; 4] {
+            let rows: [Vec<Dd>; 3] = std::array::from_fn(|k| basis(k, which == k + 1));
+            let mut sum = [Dd::ZERO; 4];
+            for (index, h) in indices(counts).zip(cell.control_points()) {
+                let factor = (0..3).fold(Dd::ONE, |f, k| f * rows[k][index[k]]);
+                let entries = [h.weight, h.weighted[0], h.weighted[1], h.weighted[2]];
+                for (s, e) in sum.iter_mut().zip(entries) {
+                    *s = *s + factor * Dd::of(e);
+                }
+            }
+            sum
+        };
+        // Leibniz's formula over the 24 permutations.
+        let rows = [row(0), row(1), row(2), row(3)];
+        let mut total = Dd::ZERO;
+        for [a, b, c, d] in indices([4; 4]) {
+            let p = [a, b, c, d];
+            let pairs = || (0..4).flat_map(|i| (i + 1..4).map(move |j| (i, j)));
+            if pairs().any(|(i, j)| p[i] == p[j]) {
+                continue;
+            }
+            let odd = pairs().filter(|&(i, j)| p[i] > p[j]).count() % 2 == 1;
+            let term = rows[0][a] * rows[1][b] * rows[2][c] * rows[3][d];
+            total = if odd { total - term } else { total + term };
+        }
+        total.f64()
     }
 }

@@ -15,9 +15,9 @@
 //! * Source: Piegl & Tiller, *The NURBS Book*, 2nd ed., §5.3; row by row as in §5.4.
 
 use super::bezier::span_to_bezier;
-use super::net::{Net, indices, map_rows, window};
 use super::curve::bounds;
 use super::jacobian::to_one;
+use super::net::{Net, indices, map_rows, window};
 use super::{
     BezierCell, Homogeneous, KnotSpan, KnotVector, NurbsError, NurbsSurface, NurbsTensor,
     NurbsVolume,
@@ -340,12 +340,19 @@ mod tests {
         // An unclamped block: every face's normal leaves the point in the middle behind.
         let knots = |n| super::super::KnotVector::unclamped_uniform(2, n).expect("valid");
         let points = indices([4, 5, 3]).map(|i| i.map(|i| i as f64 + 0.1 * (i * i) as f64));
-        let block = NurbsVolume::new([knots(4), knots(5), knots(3)], points.collect(), vec![1.0; 60])
-            .expect("valid");
+        let block = NurbsVolume::new(
+            [knots(4), knots(5), knots(3)],
+            points.collect(),
+            vec![1.0; 60],
+        )
+        .expect("valid");
         let inside = block.evaluate([0.5; 3]).expect("inside");
         for surface in block.boundary().expect("finite") {
             let point = surface.evaluate([0.5, 0.5]).expect("inside");
-            let normal = surface.normal([0.5, 0.5]).expect("inside").expect("regular");
+            let normal = surface
+                .normal([0.5, 0.5])
+                .expect("inside")
+                .expect("regular");
             let out: f64 = (0..3).map(|i| normal[i] * (point[i] - inside[i])).sum();
             assert!(out > 0.3, "{normal:?}");
         }

@@ -130,7 +130,6 @@ pub(super) fn determinant(rows: [Homogeneous<3>; 4]) -> f64 {
         + minor(a, b, 2, 3) * minor(c, d, 0, 1)
 }
 
-
 impl NurbsVolume {
     /// The point, the Jacobian matrix and its determinant at the parameters (u, v, w).
     ///
@@ -285,7 +284,12 @@ mod tests {
     #[test]
     fn derivatives_of_a_ball() {
         let ball = ball();
-        for [u, v, w] in [[0.3, 0.6, 0.9], [0.0, 0.25, 0.5], [1.0, 1.0, 1.0], [0.125, 0.0, 0.25]] {
+        for [u, v, w] in [
+            [0.3, 0.6, 0.9],
+            [0.0, 0.25, 0.5],
+            [1.0, 1.0, 1.0],
+            [0.125, 0.0, 0.25],
+        ] {
             let [cu, su] = turn(u);
             let [cv, sv] = turn(v);
             // The point derived i times by u, j times by v, k times by w.
@@ -325,7 +329,13 @@ mod tests {
     fn far_away_the_determinant_keeps_its_digits() {
         let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         // A brick whose corners are exact at 2^40.
-        let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1) * 2.0, f64::from(i >> 2)];
+        let corner = |i: u32| {
+            [
+                f64::from(i & 1),
+                f64::from(i >> 1 & 1) * 2.0,
+                f64::from(i >> 2),
+            ]
+        };
         let line = || KnotVector::bezier(1).expect("valid");
         let brick = NurbsVolume::new(
             [line(), line(), line()],
@@ -337,7 +347,10 @@ mod tests {
             .transform(&identity, &[2_f64.powi(40); 3])
             .expect("finite");
         // The point itself is rounded to 2^-12 there; the determinant takes no notice.
-        let found = far.jacobian([0.375, 0.25, 0.625]).expect("inside").determinant;
+        let found = far
+            .jacobian([0.375, 0.25, 0.625])
+            .expect("inside")
+            .determinant;
         assert!((found - 2.0).abs() < 1e-14, "{found}");
     }
 
@@ -347,7 +360,8 @@ mod tests {
         let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)];
         for weight in [1e-200, 1e200] {
             let points = (0..8).map(corner).collect();
-            let cube = NurbsVolume::new([line(), line(), line()], points, vec![weight; 8]).expect("valid");
+            let cube =
+                NurbsVolume::new([line(), line(), line()], points, vec![weight; 8]).expect("valid");
             let found = cube.jacobian([0.5; 3]).expect("inside").determinant;
             assert!((found - 1.0).abs() < 1e-14, "{found}");
             let volume = cube.moments().expect("finite").volume;

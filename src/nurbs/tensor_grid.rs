@@ -10,16 +10,17 @@
 //! ```
 //!
 //! so that a point costs p + 1 products a coordinate and not (p + 1)(q + 1)(r + 1), and no basis
-//! function is evaluated twice. The innermost sum runs over lanes of u-samples through the kernels of
-//! [`tabulate`]; planes are shared out to threads.
+//! function is evaluated twice. The innermost sum runs over lanes of u-samples, with one division for a
+//! point; planes are shared out to threads.
 //!
 //! * Shapes: the answer is a structure of arrays, x, y and z apart, the first parameter fastest.
-//! * Accuracy: γ(p + q + r + 4) of the largest coordinate beyond that of the basis functions. The
+//! * Accuracy: γ(p + q + r + 6) of the largest coordinate beyond that of the basis functions. The
 //!   numbers do not depend on the kernel or on the threads, bit for bit.
 //! * Memory: the output, and for each thread one layer of the net.
 //! * Source: S. Orszag, J. Comput. Phys. 37 (1980) 70–92 (sum factorisation).
 
-use super::{BasisCache, BasisTable, Kernel, NurbsError, NurbsTensor, tabulate};
+use super::kernel::{Curves, scalar, wide};
+use super::{BasisCache, BasisTable, Kernel, NurbsError, NurbsTensor};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -102,9 +103,12 @@ impl<const N: usize> NurbsTensor<N> {
             .try_for_each_init(
                 || vec![Columns::default(); top + 1],
                 |scratch, (sample, ((x, y), z))| {
-                    let (mine, below) = scratch.split_at_mut(1);
-                    grid.contract(top, sample, &columns, &mut mine[0]);
-                    grid.fill(top - 1, &mine[0], [x, y, z], below)
+                    let Some((mine, below)) = scratch.split_first_mut() else {
+                        return Ok(());
+                    };
+                    mine.iter_mut().for_each(Vec::clear);
+                    grid.contract(top, sample, &columns, mine);
+                    grid.fill(top - 1, mine, [x, y, z], below)
                 },
             )
     }
@@ -150,7 +154,8 @@ impl<const N: usize> NurbsTensor<N> {
     fn columns(&self) -> Columns {
         let points = self.to_homogeneous();
         let column = |axis: usize| {
-            let value = |h: &super::Homogeneous<3>| h.weighted.get(axis).copied().unwrap_or(h.weight);
+            let value =
+                |h: &super::Homogeneous<3>| h.weighted.get(axis).copied().unwrap_or(h.weight);
             points.iter().map(value).collect()
         };
         std::array::from_fn(column)
@@ -165,20 +170,20 @@ struct Grid<'a, const N: usize> {
 }
 
 impl<const N: usize> Grid<'_, N> {
-    /// The layer of a net of directions 0 to `k` at one sample of direction `k`: a net of the
-    /// directions before it.
+    /// Appends to `layer` the layer of a net of directions 0 to `k` at one sample of direction `k`: a
+    /// net of the directions before it.
     fn contract(&self, k: usize, sample: usize, net: &Columns, layer: &mut Columns) {
         let table = self.tables[k];
         let p = table.knots().degree();
         let size: usize = self.counts[..k].iter().product();
         let first = table.spans()[sample] as usize - p;
         for (net, layer) in net.iter().zip(layer) {
-            layer.clear();
-            layer.resize(size, 0.0);
+            let start = layer.len();
+            layer.resize(start + size, 0.0);
             for a in 0..=p {
                 let factor = table.row(0, a).map_or(0.0, |row| row[sample]);
                 let from = &net[(first + a) * size..][..size];
-                for (sum, value) in layer.iter_mut().zip(from) {
+                for (sum, value) in layer[start..].iter_mut().zip(from) {
                     *sum += factor * value;
                 }
             }
@@ -193,25 +198,172 @@ impl<const N: usize> Grid<'_, N> {
         out: [&mut [f64]; 3],
         scratch: &mut [Columns],
     ) -> Result<(), NurbsError> {
-        let [x, y, z] = out;
         let Some((mine, below)) = scratch.split_first_mut().filter(|_| k > 0) else {
-            let [a, b, c, weights] = net;
-            return tabulate(
-                self.kernel,
-                self.tables[0],
-                &[a, b, c],
-                weights,
-                &mut [x, y, z],
-            );
+            return self.curves(net, out);
         };
+        let [x, y, z] = out;
+        if k == 1 {
+            // All curves of the sheet in one go.
+            mine.iter_mut().for_each(Vec::clear);
+            for sample in 0..self.tables[1].samples().len() {
+                self.contract(1, sample, net, mine);
+            }
+            return self.curves(mine, [x, y, z]);
+        }
         let part: usize = (self.tables[..k].iter())
             .map(|table| table.samples().len())
             .product();
-        let parts = x.chunks_mut(part).zip(y.chunks_mut(part)).zip(z.chunks_mut(part));
+        let parts = x
+            .chunks_mut(part)
+            .zip(y.chunks_mut(part))
+            .zip(z.chunks_mut(part));
         for (sample, ((x, y), z)) in parts.enumerate() {
+            mine.iter_mut().for_each(Vec::clear);
             self.contract(k, sample, net, mine);
             self.fill(k - 1, mine, [x, y, z], below)?;
         }
         Ok(())
+    }
+
+    /// The points of curves in direction 0 that stand one after the other in `net`.
+    fn curves(&self, net: &Columns, out: [&mut [f64]; 3]) -> Result<(), NurbsError> {
+        let usable = |w: f64| w > 0.0 && w.is_finite();
+        if let Some(index) = net[3].iter().position(|&w| !usable(w)) {
+            return Err(NurbsError::Weight {
+                index,
+                found: net[3][index],
+            });
+        }
+        let table = self.tables[0];
+        let curves = Curves {
+            basis: table.rows(0),
+            stride: table.stride(),
+            runs: table.runs(),
+            degree: table.knots().degree(),
+            control_points: self.counts[0],
+            samples: table.samples().len(),
+            net: net.each_ref().map(Vec::as_slice),
+        };
+        match self.kernel.lanes() {
+            Some(arch) => arch.dispatch(wide::CurvePoints {
+                curves: &curves,
+                out,
+            }),
+            None => scalar::curves(&curves, out),
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::kernel::every_kernel;
+    use super::super::net::indices;
+    use super::super::tensor_testing::{extent, inside, maps};
+    use super::super::testing::{gamma, gap};
+    use super::super::{KnotVector, NurbsSurface, SimdLevel};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn plain() -> Kernel {
+        Kernel::new(SimdLevel::Scalar).expect("the plain loops are always there")
+    }
+
+    fn bits(points: &[Vec<f64>; 3]) -> Vec<u64> {
+        points.iter().flatten().map(|x| x.to_bits()).collect()
+    }
+
+    /// The grid by every kernel, against the plain loops bit for bit and `evaluate` within rounding.
+    fn check<const N: usize>(
+        map: &NurbsTensor<N>,
+        fractions: &[Vec<f64>],
+    ) -> Result<(), TestCaseError> {
+        let samples: Vec<Vec<f64>> = (0..N)
+            .map(|k| {
+                fractions[k]
+                    .iter()
+                    .map(|&t| inside(map, [t; N])[k])
+                    .collect()
+            })
+            .collect();
+        let lists = std::array::from_fn(|k| samples[k].as_slice());
+        let expected = map
+            .sample_grid(&BasisCache::new(plain()), lists)
+            .expect("inside");
+        for kernel in every_kernel() {
+            let found = map
+                .sample_grid(&BasisCache::new(kernel), lists)
+                .expect("inside");
+            prop_assert_eq!(bits(&found), bits(&expected), "{:?}", kernel.level());
+        }
+        let bound = extent(map) * 4.0 * gamma(100);
+        for (i, index) in indices(lists.map(<[f64]>::len)).enumerate() {
+            let at = std::array::from_fn(|k| lists[k][index[k]]);
+            let point = map.evaluate(at).expect("inside");
+            let found = [expected[0][i], expected[1][i], expected[2][i]];
+            prop_assert!(
+                gap(found, point) <= bound,
+                "{at:?}: {found:?} for {point:?}"
+            );
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn volumes_on_a_grid(
+            map in maps::<3>(), sorted: bool,
+            mut fractions in prop::collection::vec(prop::collection::vec(0.0..=1.0_f64, 0..=21), 3),
+        ) {
+            for list in &mut fractions {
+                list.extend([0.0, 1.0]);
+                if sorted {
+                    list.sort_by(f64::total_cmp);
+                }
+            }
+            check(&map, &fractions)?;
+        }
+
+        #[test]
+        fn surfaces_on_a_grid(
+            map in maps::<2>(),
+            fractions in prop::collection::vec(prop::collection::vec(0.0..=1.0_f64, 0..=90), 2),
+        ) {
+            check(&map, &fractions)?;
+        }
+    }
+
+    #[test]
+    fn wrong_questions_are_errors() {
+        let line = || KnotVector::bezier(1).expect("valid");
+        let sheet =
+            NurbsSurface::new([line(), line()], vec![[0.0; 3]; 4], vec![1.0; 4]).expect("valid");
+        let cache = BasisCache::default();
+        assert!(matches!(
+            sheet.sample_grid(&cache, [&[0.5], &[0.5, 2.0]]),
+            Err(NurbsError::SampleOutsideDomain { index: 1, .. })
+        ));
+        let empty = sheet
+            .sample_grid(&cache, [&[], &[0.5]])
+            .expect("an empty grid");
+        assert!(empty.iter().all(Vec::is_empty));
+        let kernel = Kernel::default();
+        let table = BasisTable::new(&line(), &[0.5], 0, kernel).expect("inside");
+        let other = KnotVector::bezier(2).expect("valid");
+        let other = BasisTable::new(&other, &[0.5], 0, kernel).expect("inside");
+        let [mut x, mut y, mut z] = [[0.0; 1]; 3];
+        let wrong = sheet.evaluate_grid(kernel, [&table, &other], [&mut x, &mut y, &mut z]);
+        assert_eq!(wrong, Err(NurbsError::TableKnots { direction: 1 }));
+        let short = sheet.evaluate_grid(kernel, [&table, &table], [&mut x, &mut y, &mut []]);
+        assert!(matches!(
+            short,
+            Err(NurbsError::Length {
+                found: 0,
+                expected: 1,
+                ..
+            })
+        ));
     }
 }

@@ -1,4 +1,4 @@
-//! Volume and moments of a NURBS volume, area of a NURBS surface: product Gauss rules on Bézier cells.
+//! Volume and moments of a NURBS volume, area of a NURBS surface.
 //!
 //! ```text
 //!   V     = ∭ det J          ∭ x det J,  ∭ x x^T det J       over the parameters
@@ -6,61 +6,25 @@
 //! ```
 //!
 //! Where a cell's weights are equal the map is polynomial, the integrands have degree 5 p - 1 at most
-//! and a rule of 5 p / 2 points is exact. Elsewhere the number of points grows, in each direction
-//! apart, until the next rule changes nothing; where the longest rule does not get there, the box is
-//! halved in that direction, the worst box first:
-//!
-//! ```text
-//!   I       = G(n) + Σ_k (G(n, next n_k) - G(n))        value
-//!   error   = Σ_k |G(n, next n_k) - G(n)|  +  rounding
-//! ```
-//!
-//! The estimate is the error of G(n), which the sum of the changes removes to first order; for these
-//! analytic integrands what is left is smaller by orders. Collapsed edges and corners do no harm: det
-//! J is a smooth function there, and |X_u x X_v| at worst one with a cone's tip, towards which boxes
-//! are halved.
+//! and a rule of 5 p / 2 points is exact. Elsewhere the rules are lengthened, and boxes halved, until
+//! they agree. Collapsed edges and corners do no harm: det J is a smooth function there, and
+//! |X_u x X_v| at worst one with a cone's tip, towards which boxes are halved.
 //!
 //! A cell is integrated about its own middle, and its moments shifted afterwards: a small ring far
 //! away loses no digits that its control points have.
 //!
 //! * Units: model units to the powers 3, 4, 5 and 2.
 //! * Accuracy: relative errors of about 1e-14 of the integrals of absolute values; the estimate
-//!   tells, and holds [`ROUNDING`] of those integrals for rounding.
-//! * Work: [`POINTS`] points for a cell at most; then the best there is, with its estimate.
+//!   tells.
+//! * Work: two million points for a cell at most; then the best there is, with its estimate.
 //! * Source: Press et al., *Numerical Recipes*, 3rd ed., §4.6 and §4.8.
 
-use super::net::{map_rows, place};
-use super::tensor_bezier::{CentredCell, Spans};
+use super::cell_quadrature::integrate_cells;
 use super::tensor_derivatives::{cross, determinant};
-use super::{Homogeneous, NurbsError, NurbsSurface, NurbsTensor, NurbsVolume};
+use super::{Homogeneous, NurbsError, NurbsSurface, NurbsVolume};
 use crate::math::dd::{Dd, Real};
-use crate::math::gauss::nodes;
 use crate::math::quadrature::Integral;
 use crate::math::tolerance::U;
-use rayon::prelude::*;
-use std::sync::LazyLock;
-
-/// Points of the rules, shortest first.
-const ORDERS: [usize; 10] = [3, 5, 8, 10, 13, 16, 20, 24, 28, 32];
-
-/// Change of a rule, as a share of the integral of absolute values, that counts as none.
-const AGREEMENT: f64 = 2e-15;
-
-/// What rounding may have done, as a share of the integral of absolute values: some tens of units
-/// in the last place go into a determinant, and few of them have the same sign.
-const ROUNDING: f64 = 32.0 * U;
-
-/// Points of one cell, at most; about a second's work.
-const POINTS: usize = 4_000_000;
-
-/// Nodes and weights on [0, 1] of each of the [`ORDERS`].
-static RULES: LazyLock<Vec<Vec<(f64, f64)>>> = LazyLock::new(|| {
-    let rule = |&n: &usize| {
-        let pairs = nodes(n).into_iter();
-        pairs.map(|(x, w)| (x.f64(), w.f64())).collect()
-    };
-    ORDERS.iter().map(rule).collect()
-});
 
 /// Volume, first and second moments of a map, each with an estimate of its error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -134,7 +98,11 @@ impl NurbsVolume {
                 total.add(part);
             }
         }
-        let sign = if total[0].value.f64() < 0.0 { -1.0 } else { 1.0 };
+        let sign = if total[0].value.f64() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         let value = |i: usize| Integral {
             value: sign * total[i].value.f64(),
             error: total[i].error,
@@ -244,256 +212,289 @@ fn shifted(part: &[Integral; 10], shift: [f64; 3]) -> [Integral; 10] {
     ]
 }
 
-/// K integrals over each cell, with the origin about which the integrand got its points.
-///
-/// * `integrand`: from A, w and their derivatives, the K values and what their rounding is relative
-///   to.
-#[allow(clippy::type_complexity, reason = "an origin and K integrals for each cell")]
-fn integrate_cells<const N: usize, const K: usize>(
-    map: &NurbsTensor<N>,
-    integrand: impl Fn(Homogeneous<3>, &[Homogeneous<3>; N]) -> ([f64; K], [f64; K]) + Sync,
-) -> Result<Vec<([f64; 3], [Integral; K])>, NurbsError> {
-    let spans = Spans::new(map);
-    let cells: Vec<_> = super::net::indices(spans.cells).collect();
-    let degrees = map.degrees();
-    let one = |index| {
-        let CentredCell { origin, points, .. } = map.centred_cell(&spans, index)?;
-        let cell = Cell {
-            degrees,
-            points,
-            integrand: &integrand,
-        };
-        Ok((origin, cell.integrate()))
-    };
-    cells.into_par_iter().map(one).collect()
-}
+#[cfg(test)]
+mod tests {
+    use super::super::KnotVector;
+    use super::super::net::indices;
+    use super::super::tensor_testing::{biquadratic, maps, octant, polar, sphere, torus, turned};
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
 
-/// One cell and what is integrated over it.
-struct Cell<'a, F, const N: usize> {
-    degrees: [usize; N],
-    points: Vec<Homogeneous<3>>,
-    integrand: &'a F,
-}
-
-/// Sums of one rule over a box: of the integrands and of the sizes of their terms.
-#[derive(Clone, Copy)]
-struct Rule<const K: usize> {
-    values: [f64; K],
-    sizes: [f64; K],
-}
-
-/// A box of parameters with the integrals over it.
-struct Panel<const N: usize, const K: usize> {
-    start: [f64; N],
-    size: [f64; N],
-    result: Rule<K>,
-    errors: [f64; K],
-    /// The direction whose rule changed most.
-    worst: usize,
-}
-
-impl<F, const N: usize, const K: usize> Cell<'_, F, N>
-where
-    F: Fn(Homogeneous<3>, &[Homogeneous<3>; N]) -> ([f64; K], [f64; K]) + Sync,
-{
-    /// The integrals over the cell.
-    fn integrate(&self) -> [Integral; K] {
-        let polynomial = self.points.windows(2).all(|h| h[0].weight == h[1].weight);
-        let exact = (self.degrees).map(|p| ORDERS.iter().position(|&n| 2 * n >= 5 * p));
-        let finished = |result: Rule<K>, errors: [f64; K]| {
-            std::array::from_fn(|i| Integral {
-                value: result.values[i],
-                error: errors[i] + ROUNDING * result.sizes[i],
-            })
-        };
-        // The moments are polynomials; an area's integrand is a root and gets no such promise.
-        if K > 1 && polynomial && exact.iter().all(Option::is_some) {
-            let orders = exact.map(Option::unwrap_or_default);
-            return finished(self.rule([0.0; N], [1.0; N], orders), [0.0; K]);
-        }
-        let first = self.degrees.map(|p| ORDERS.iter().position(|&n| n > 2 * p));
-        let first = first.map(|i| i.unwrap_or(ORDERS.len() - 2).min(ORDERS.len() - 2));
-        let whole = self.rule([0.0; N], [1.0; N], first);
-        let tolerances = whole.sizes.map(|size| AGREEMENT * size);
-        let mut points = 0;
-        let mut panel = |start, size| self.panel(start, size, first, &tolerances, &mut points);
-        let mut panels = vec![panel([0.0; N], [1.0; N])];
-        let excess = |errors: &[f64; K]| {
-            let shares = errors.iter().zip(&tolerances);
-            shares.fold(0.0_f64, |m, (e, t)| m.max(if *e > *t { e / t } else { 0.0 }))
-        };
-        loop {
-            let mut errors = [0.0; K];
-            for panel in &panels {
-                for (sum, error) in errors.iter_mut().zip(panel.errors) {
-                    *sum += error;
-                }
-            }
-            let worst = (0..panels.len())
-                .map(|i| (excess(&panels[i].errors), i))
-                .filter(|(excess, _)| *excess > 0.0)
-                .max_by(|a, b| a.0.total_cmp(&b.0));
-            // Three directions may each have changed by a tolerance.
-            let done = (errors.iter().zip(&tolerances)).all(|(e, t)| *e <= 4.0 * t);
-            let Some((_, i)) = worst.filter(|_| !done) else {
-                break;
-            };
-            let Panel {
-                start, size, worst, ..
-            } = panels[i];
-            let mut half = size;
-            half[worst] *= 0.5;
-            let mut after = start;
-            after[worst] += half[worst];
-            if after[worst] <= start[worst] {
-                break;
-            }
-            let mut panel = |start, size| self.panel(start, size, first, &tolerances, &mut points);
-            panels[i] = panel(start, half);
-            panels.push(panel(after, half));
-            if points > POINTS {
-                break;
-            }
-        }
-        let mut sum = Rule {
-            values: [0.0; K],
-            sizes: [0.0; K],
-        };
-        let mut values = [Dd::ZERO; K];
-        let mut errors = [0.0; K];
-        for panel in &panels {
-            for i in 0..K {
-                values[i] = values[i] + Dd::of(panel.result.values[i]);
-                sum.sizes[i] += panel.result.sizes[i];
-                errors[i] += panel.errors[i];
-            }
-        }
-        sum.values = values.map(Real::f64);
-        finished(sum, errors)
+    /// A value against the exact one: within its estimate, which is at most `relative` of `scale`.
+    fn check(name: &str, found: Integral, exact: f64, scale: f64, relative: f64) {
+        let off = (found.value - exact).abs();
+        assert!(
+            off <= found.error && found.error <= relative * scale,
+            "{name}: {} for {exact}, off by {:e} of {scale}, estimate {:e}",
+            found.value,
+            off / scale,
+            found.error / scale
+        );
     }
 
-    /// The integrals over a box, with rules as long as they need to be, or the longest.
-    fn panel(
-        &self,
-        start: [f64; N],
-        size: [f64; N],
-        first: [usize; N],
-        tolerances: &[f64; K],
-        points: &mut usize,
-    ) -> Panel<N, K> {
-        let mut orders = first;
-        loop {
-            let base = self.rule(start, size, orders);
-            let mut result = base;
-            let mut errors = [0.0; K];
-            let mut next = orders;
-            let mut worst = (0.0, 0);
-            for k in 0..N {
-                let mut longer = orders;
-                longer[k] += 1;
-                *points += longer.iter().map(|&i| ORDERS[i]).product::<usize>();
-                let rule = self.rule(start, size, longer);
-                let mut excess = 0.0_f64;
-                for i in 0..K {
-                    let change = rule.values[i] - base.values[i];
-                    result.values[i] += change;
-                    errors[i] += change.abs();
-                    if change.abs() > tolerances[i] {
-                        excess = excess.max(change.abs() / tolerances[i]);
-                    }
-                }
-                if excess > worst.0 {
-                    worst = (excess, k);
-                }
-                if excess > 0.0 && longer[k] + 1 < ORDERS.len() {
-                    next[k] = longer[k];
-                }
-            }
-            if next == orders || *points > POINTS {
-                return Panel {
-                    start,
-                    size,
-                    result,
-                    errors,
-                    worst: worst.1,
-                };
-            }
-            orders = next;
-        }
+    fn line() -> KnotVector {
+        KnotVector::bezier(1).expect("valid")
     }
 
-    /// One product rule over a box.
-    fn rule(&self, start: [f64; N], size: [f64; N], orders: [usize; N]) -> Rule<K> {
-        let counts = self.degrees.map(|p| p + 1);
-        // What is asked for: the value, and the derivative by each parameter.
-        let mut nets = vec![(None, (counts, self.points.clone()))];
-        for k in 0..N {
-            let basis: Vec<_> = RULES[orders[k]]
+    #[test]
+    fn solids_of_revolution_in_closed_form() {
+        let (r, h) = (2.0, 5.0);
+        for disc in [biquadratic(), polar()] {
+            let cylinder = turned(&line(), &[([r, 0.0], 1.0), ([r, h], 1.0)], &disc);
+            let found = cylinder.moments().expect("finite");
+            let volume = PI * r * r * h;
+            check("cylinder", found.volume, volume, volume, 1e-13);
+            check("x", found.first[0], 0.0, volume * r, 1e-13);
+            check("z", found.first[2], volume * h / 2.0, volume * h, 1e-13);
+            check(
+                "xx",
+                found.second[0][0],
+                volume * r * r / 4.0,
+                volume * h * h,
+                1e-13,
+            );
+            check("xy", found.second[0][1], 0.0, volume * h * h, 1e-13);
+            check(
+                "zz",
+                found.second[2][2],
+                volume * h * h / 3.0,
+                volume * h * h,
+                1e-13,
+            );
+            assert_eq!(found.second[0][2], found.second[2][0]);
+
+            let cone = turned(&line(), &[([r, 0.0], 1.0), ([0.0, h], 1.0)], &disc);
+            let found = cone.moments().expect("finite");
+            let volume = PI * r * r * h / 3.0;
+            check("cone", found.volume, volume, volume, 1e-13);
+            check("z", found.first[2], volume * h / 4.0, volume * h, 1e-13);
+            check(
+                "xx",
+                found.second[0][0],
+                PI * r.powi(4) * h / 20.0,
+                volume * h * h,
+                1e-13,
+            );
+
+            let radius: f64 = 1.5;
+            let ball = sphere(radius, &disc);
+            let volume = 4.0 * PI * radius.powi(3) / 3.0;
+            for ball in [&ball, &ball.reverse(2).expect("valid")] {
+                let found = ball.moments().expect("finite");
+                check("ball", found.volume, volume, volume, 1e-13);
+                for i in 0..3 {
+                    let exact = volume * radius * radius / 5.0;
+                    check(
+                        "xx",
+                        found.second[i][i],
+                        exact,
+                        volume * radius * radius,
+                        1e-13,
+                    );
+                }
+            }
+            // The six faces: two points, and the rim of the disc; its whole is the sphere.
+            let faces = ball.boundary().expect("finite");
+            let area = faces.map(|face| face.area().expect("finite"));
+            let sum = area.iter().fold(Integral::default(), |sum, face| Integral {
+                value: sum.value + face.value,
+                error: sum.error + face.error,
+            });
+            // The polar disc's seam, twice a half disc, counts too.
+            let polar = area[4].value + area[5].value > 0.1 && disc.points.len() > 9;
+            let seam = if polar { PI * radius * radius } else { 0.0 };
+            let exact = 4.0 * PI * radius * radius + seam;
+            check("sphere", sum, exact, exact, 1e-11);
+        }
+        let (big, small) = (3.0_f64, 1.0_f64);
+        let found = torus(big, small).moments().expect("finite");
+        let volume = 2.0 * PI * PI * big * small * small;
+        check("torus", found.volume, volume, volume, 1e-13);
+        let axial = Integral {
+            value: found.second[0][0].value + found.second[1][1].value,
+            error: found.second[0][0].error + found.second[1][1].error,
+        };
+        let exact = volume * (big * big + 0.75 * small * small);
+        check("torus about its axis", axial, exact, volume * 16.0, 1e-13);
+        let area = torus(big, small)
+            .boundary()
+            .expect("finite")
+            .map(|f| f.area().expect("finite"));
+        let sum = area[..4]
+            .iter()
+            .fold(Integral::default(), |sum, f| Integral {
+                value: sum.value + f.value,
+                error: sum.error + f.error,
+            });
+        let exact = 4.0 * PI * PI * big * small;
+        check("torus area", sum, exact, exact, 1e-12);
+        check(
+            "octant",
+            octant().area().expect("finite"),
+            PI / 2.0,
+            PI / 2.0,
+            1e-12,
+        );
+    }
+
+    #[test]
+    fn a_ring_far_away_keeps_its_digits() {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        // The control points themselves are rounded to 1.2e-10 out there, a 2e-10th of the radius.
+        let (big, small) = (1e6, 0.5);
+        let found = torus(big, small).moments().expect("finite");
+        let volume = 2.0 * PI * PI * big * small * small;
+        let off = (found.volume.value - volume).abs() / volume;
+        assert!(off < 1e-9, "{off:e}");
+        // A block with exact corners: here nothing is lost at all.
+        let corner = |i: u32| {
+            [
+                f64::from(i & 1),
+                f64::from(i >> 1 & 1) * 2.0,
+                f64::from(i >> 2),
+            ]
+        };
+        let brick = NurbsVolume::new(
+            [line(), line(), line()],
+            (0..8).map(corner).collect(),
+            vec![1.0; 8],
+        )
+        .expect("valid")
+        .transform(&identity, &[1e6, -2e6, 0.5])
+        .expect("finite");
+        let found = brick
+            .moments_about([1e6 + 0.5, -2e6 + 1.0, 1.0])
+            .expect("finite");
+        check("volume", found.volume, 2.0, 2.0, 1e-13);
+        check("x", found.first[0], 0.0, 2.0, 1e-13);
+        check("yy", found.second[1][1], 2.0 / 3.0, 1.0, 1e-12);
+        let found = brick.moments().expect("finite");
+        check(
+            "x about the origin",
+            found.first[0],
+            2.0 * (1e6 + 0.5),
+            2e6,
+            1e-13,
+        );
+        let exact = 2.0 * ((1e6 + 0.5) * (1e6 + 0.5) + 1.0 / 12.0);
+        check(
+            "xx about the origin",
+            found.second[0][0],
+            exact,
+            exact,
+            1e-13,
+        );
+    }
+
+    #[test]
+    fn hard_weights_and_folded_signs() {
+        // A block whose weights differ ten-thousandfold is still the block: x = w u / ((1 - u) + w u).
+        let corner = |i: u32| [f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)];
+        let weights = (0..8).map(|i| if i & 1 == 1 { 1e4 } else { 1.0 }).collect();
+        let cube = NurbsVolume::new(
+            [line(), line(), line()],
+            (0..8).map(corner).collect(),
+            weights,
+        )
+        .expect("valid");
+        let found = cube.moments().expect("finite");
+        check("volume", found.volume, 1.0, 1.0, 1e-11);
+        check("xx", found.second[0][0], 1.0 / 3.0, 1.0, 1e-11);
+        let mirrored = cube.permute([1, 0, 2]).expect("a permutation");
+        assert!(mirrored.jacobian([0.5; 3]).expect("inside").determinant < 0.0);
+        check(
+            "mirrored",
+            mirrored.moments().expect("finite").volume,
+            1.0,
+            1.0,
+            1e-11,
+        );
+    }
+
+    #[test]
+    fn areas_with_corners_and_tips() {
+        // A flat disc, whose corners have parallel tangents, and a polar one with a collapsed edge.
+        for disc in [biquadratic(), polar()] {
+            let points = disc
+                .points
                 .iter()
-                .map(|&(x, _)| bernstein(self.degrees[k], start[k] + size[k] * x))
+                .map(|&([x, y], _)| [3.0 * x, 3.0 * y, 1.0])
                 .collect();
-            let sum = |row: &[Homogeneous<3>], functions: &[f64]| {
-                let pairs = functions.iter().zip(row);
-                pairs.fold(Homogeneous::ZERO, |sum, (&b, &h)| sum.plus(b, h))
-            };
-            nets = nets
-                .into_iter()
-                .flat_map(|(derived, (counts, net))| {
-                    let values = map_rows(counts, &net, k, |row| {
-                        basis.iter().map(|(b, _)| sum(row, b)).collect()
-                    });
-                    let slopes = derived.is_none().then(|| {
-                        let net = map_rows(counts, &net, k, |row| {
-                            basis.iter().map(|(_, d)| sum(row, d)).collect()
-                        });
-                        (Some(k), net)
-                    });
-                    std::iter::once((derived, values)).chain(slopes)
-                })
-                .collect();
+            let weights = disc.points.iter().map(|&(_, w)| w).collect();
+            let surface = NurbsSurface::new(disc.knots, points, weights).expect("valid");
+            check(
+                "disc",
+                surface.area().expect("finite"),
+                9.0 * PI,
+                9.0 * PI,
+                1e-12,
+            );
         }
-        let counts = orders.map(|i| ORDERS[i]);
-        let mut slots: [usize; N] = [0; N];
-        let mut value = 0;
-        for (slot, (derived, _)) in nets.iter().enumerate() {
-            match derived {
-                Some(k) => slots[*k] = slot,
-                None => value = slot,
-            }
-        }
-        let mut values = [Dd::ZERO; K];
-        let mut sizes = [0.0; K];
-        for index in super::net::indices(counts) {
-            let at = place(counts, index);
-            let weight: f64 = (0..N)
-                .map(|k| size[k] * RULES[orders[k]][index[k]].1)
-                .product();
-            let slopes = slots.map(|slot| nets[slot].1.1[at]);
-            let (f, s) = (self.integrand)(nets[value].1.1[at], &slopes);
-            for i in 0..K {
-                values[i] = values[i] + Dd::of(weight * f[i]);
-                sizes[i] += weight * s[i];
-            }
-        }
-        Rule {
-            values: values.map(Real::f64),
-            sizes,
-        }
+        // A folded strip: |J| has a crease inside, x = 4 u (1 - u) twice over [0, 1].
+        let points = vec![
+            [0.0, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [2.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ];
+        let strip = NurbsSurface::new(
+            [KnotVector::bezier(2).expect("valid"), line()],
+            points,
+            vec![1.0; 6],
+        )
+        .expect("valid");
+        check("strip", strip.area().expect("finite"), 2.0, 2.0, 1e-11);
     }
-}
 
-/// The Bernstein polynomials of degree p at t, and their derivatives.
-fn bernstein(p: usize, t: f64) -> (Vec<f64>, Vec<f64>) {
-    let mut values = vec![1.0];
-    let mut slopes = vec![0.0];
-    for degree in 1..=p {
-        let lower = values;
-        let at = |i: usize| lower.get(i).copied().unwrap_or(0.0);
-        let before = |i: usize| i.checked_sub(1).map_or(0.0, at);
-        values = (0..=degree).map(|i| (1.0 - t) * at(i) + t * before(i)).collect();
-        if degree == p {
-            slopes = (0..=p).map(|i| p as f64 * (before(i) - at(i))).collect();
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(6))]
+
+        #[test]
+        fn moments_follow_affine_maps(map in maps::<3>()) {
+            // Weights that differ a hundredfold from one control point to the next take their time.
+            prop_assume!(map.knots().iter().map(|k| k.spans().count()).product::<usize>() <= 3);
+            let whole = map.moments().expect("finite");
+            let matrix = [[2.0, 0.5, 0.0], [0.0, 1.0, -0.25], [1.0, 0.0, 1.5]];
+            let image = map.transform(&matrix, &[0.0; 3]).expect("finite").moments().expect("finite");
+            let determinant = 2.0 * 1.5 - 0.5 * 0.25;
+            let expected = whole.volume.value * determinant;
+            let error = whole.volume.error * determinant + image.volume.error;
+            prop_assert!((image.volume.value - expected).abs() <= error,
+                "{} for {expected}, {error:e}", image.volume.value);
+            let expected = (0..3).map(|i| matrix[1][i] * whole.first[i].value).sum::<f64>() * determinant;
+            let error: f64 = (0..3).map(|i| 2.0 * whole.first[i].error * determinant).sum::<f64>()
+                + image.first[1].error;
+            prop_assert!((image.first[1].value - expected).abs() <= error,
+                "{} for {expected}, {error:e}", image.first[1].value);
         }
     }
-    (values, slopes)
+
+    #[test]
+    fn a_polynomial_map_is_integrated_exactly() {
+        // x = u, y = v + u², z = w + u v: volume 1, ∭ z = ∫ w + u v = 3/4, ∭ y² = ∭ (v + u²)².
+        let quadratic = || KnotVector::bezier(2).expect("valid");
+        let square = [0.0, 0.0, 1.0];
+        let half = |i: usize| i as f64 / 2.0;
+        let points = indices([3, 3, 2])
+            .map(|[i, j, k]| [half(i), half(j) + square[i], k as f64 + half(i) * half(j)]);
+        let map = NurbsVolume::new(
+            [quadratic(), quadratic(), line()],
+            points.collect(),
+            vec![0.7; 18],
+        )
+        .expect("valid");
+        let found = map.moments().expect("finite");
+        check("volume", found.volume, 1.0, 1.0, 1e-13);
+        check("z", found.first[2], 0.75, 1.0, 1e-13);
+        check(
+            "yy",
+            found.second[1][1],
+            1.0 / 3.0 + 1.0 / 3.0 + 0.2,
+            2.0,
+            1e-13,
+        );
+    }
 }

@@ -127,12 +127,10 @@ impl<const N: usize> NurbsTensor<N> {
         let part = |knots: Vec<f64>, control: std::ops::Range<usize>| {
             let mut all = whole.knots().clone();
             all[direction] = KnotVector::from_valid(p, knots);
-            let (_, points) = super::net::map_rows(
-                whole.counts(),
-                whole.control_points(),
-                direction,
-                |row| row[control.clone()].to_vec(),
-            );
+            let (_, points) =
+                super::net::map_rows(whole.counts(), whole.control_points(), direction, |row| {
+                    row[control.clone()].to_vec()
+                });
             let (_, weights) =
                 super::net::map_rows(whole.counts(), whole.weights(), direction, |row| {
                     row[control.clone()].to_vec()
@@ -161,10 +159,9 @@ impl<const N: usize> NurbsTensor<N> {
             super::net::map_rows(self.counts(), self.control_points(), direction, |row| {
                 row.iter().rev().copied().collect()
             });
-        let (_, weights) =
-            super::net::map_rows(self.counts(), self.weights(), direction, |row| {
-                row.iter().rev().copied().collect()
-            });
+        let (_, weights) = super::net::map_rows(self.counts(), self.weights(), direction, |row| {
+            row.iter().rev().copied().collect()
+        });
         Self::new(knots, points, weights)
     }
 
@@ -316,7 +313,7 @@ impl<const N: usize> NurbsTensor<N> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tensor_testing::{extent, inside, maps, sphere, biquadratic};
+    use super::super::tensor_testing::{biquadratic, extent, inside, maps, sphere};
     use super::super::testing::{gamma, gap, parameter};
     use super::super::{NurbsSurface, NurbsVolume};
     use super::*;
@@ -330,7 +327,12 @@ mod tests {
         t: [f64; N],
     ) -> Result<(), TestCaseError> {
         prop_assert_eq!(a.domain(), b.domain());
-        let roundings: usize = a.degrees().iter().chain(&b.degrees()).map(|p| 9 * p + 9).sum();
+        let roundings: usize = a
+            .degrees()
+            .iter()
+            .chain(&b.degrees())
+            .map(|p| 9 * p + 9)
+            .sum();
         // The quotient passes on errors of weights as large as they differ: a hundredfold here.
         let bound = extent(a) * (4.0 * gamma(roundings) + 4.0 * gamma(5 * layers + 4));
         for shift in [0.0, 0.33, 0.66] {
@@ -451,13 +453,20 @@ mod tests {
     #[test]
     fn wrong_directions_are_errors() {
         let line = || KnotVector::bezier(1).expect("valid");
-        let sheet = NurbsSurface::new([line(), line()], vec![[0.0; 3]; 4], vec![1.0; 4]).expect("valid");
+        let sheet =
+            NurbsSurface::new([line(), line()], vec![[0.0; 3]; 4], vec![1.0; 4]).expect("valid");
         let wrong = |found| Err(NurbsError::Direction { found, limit: 2 });
         assert_eq!(sheet.insert_knot(2, 0.5, 1), wrong(2));
         assert_eq!(sheet.reverse(7), wrong(7));
         assert_eq!(sheet.permute([1, 1]), wrong(1));
         assert!(sheet.split(3, 0.5).is_err() && sheet.reparametrize(2, 0.0, 1.0).is_err());
-        assert!(matches!(sheet.split(0, 0.0), Err(NurbsError::SplitAtEnd { .. })));
-        assert!(matches!(sheet.split(0, f64::NAN), Err(NurbsError::OutsideDomain { .. })));
+        assert!(matches!(
+            sheet.split(0, 0.0),
+            Err(NurbsError::SplitAtEnd { .. })
+        ));
+        assert!(matches!(
+            sheet.split(0, f64::NAN),
+            Err(NurbsError::OutsideDomain { .. })
+        ));
     }
 }

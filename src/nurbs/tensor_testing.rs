@@ -27,14 +27,21 @@ fn basis(knots: &[f64], last: usize, i: usize, p: usize, u: f64) -> f64 {
         return f64::from(u8::from((knots[i] <= u && u < knots[i + 1]) || closed));
     }
     let part = |top: f64, bottom: f64, value: f64| {
-        if bottom == 0.0 { 0.0 } else { top / bottom * value }
+        if bottom == 0.0 {
+            0.0
+        } else {
+            top / bottom * value
+        }
     };
-    part(u - knots[i], knots[i + p] - knots[i], basis(knots, last, i, p - 1, u))
-        + part(
-            knots[i + p + 1] - u,
-            knots[i + p + 1] - knots[i + 1],
-            basis(knots, last, i + 1, p - 1, u),
-        )
+    part(
+        u - knots[i],
+        knots[i + p] - knots[i],
+        basis(knots, last, i, p - 1, u),
+    ) + part(
+        knots[i + p + 1] - u,
+        knots[i + p + 1] - knots[i + 1],
+        basis(knots, last, i + 1, p - 1, u),
+    )
 }
 
 /// The point by the definition: every basis function by recursion, every control point summed.
@@ -80,7 +87,9 @@ pub(super) fn maps<const N: usize>() -> impl Strategy<Value = NurbsTensor<N>> {
         let points = (0..count)
             .map(|_| [0.0; 3].map(|_| 20.0 * random() - 10.0))
             .collect();
-        let weights = (0..count).map(|_| 10_f64.powf(2.0 * random() - 1.0)).collect();
+        let weights = (0..count)
+            .map(|_| 10_f64.powf(2.0 * random() - 1.0))
+            .collect();
         NurbsTensor::new(knots, points, weights).expect("valid")
     })
 }
@@ -97,7 +106,15 @@ pub(super) struct Disc {
 /// The 9-point circle.
 pub(super) fn circle() -> Vec<([f64; 2], f64)> {
     let on = [
-        [1., 0.], [1., 1.], [0., 1.], [-1., 1.], [-1., 0.], [-1., -1.], [0., -1.], [1., -1.], [1., 0.],
+        [1., 0.],
+        [1., 1.],
+        [0., 1.],
+        [-1., 1.],
+        [-1., 0.],
+        [-1., -1.],
+        [0., -1.],
+        [1., -1.],
+        [1., 0.],
     ];
     (on.into_iter().enumerate())
         .map(|(i, p)| (p, if i % 2 == 0 { 1.0 } else { S }))
@@ -112,9 +129,15 @@ pub(super) fn circle_knots() -> KnotVector {
 /// The biquadratic unit disc.
 pub(super) fn biquadratic() -> Disc {
     let rows = [
-        ([-S, -S], 1.0), ([0.0, -2.0 * S], S), ([S, -S], 1.0),
-        ([-2.0 * S, 0.0], S), ([0.0, 0.0], 1.0), ([2.0 * S, 0.0], S),
-        ([-S, S], 1.0), ([0.0, 2.0 * S], S), ([S, S], 1.0),
+        ([-S, -S], 1.0),
+        ([0.0, -2.0 * S], S),
+        ([S, -S], 1.0),
+        ([-2.0 * S, 0.0], S),
+        ([0.0, 0.0], 1.0),
+        ([2.0 * S, 0.0], S),
+        ([-S, S], 1.0),
+        ([0.0, 2.0 * S], S),
+        ([S, S], 1.0),
     ];
     let knots = || KnotVector::bezier(2).expect("valid");
     Disc {
@@ -152,7 +175,11 @@ pub(super) fn sphere(radius: f64, disc: &Disc) -> NurbsVolume {
     let knots = KnotVector::new(2, vec![0., 0., 0., 0.5, 0.5, 1., 1., 1.]).expect("valid");
     let r = radius;
     let meridian = [
-        ([0.0, -r], 1.0), ([r, -r], S), ([r, 0.0], 1.0), ([r, r], S), ([0.0, r], 1.0),
+        ([0.0, -r], 1.0),
+        ([r, -r], S),
+        ([r, 0.0], 1.0),
+        ([r, r], S),
+        ([0.0, r], 1.0),
     ];
     turned(&knots, &meridian, disc)
 }
@@ -198,7 +225,15 @@ pub(super) fn octant() -> NurbsSurface {
 pub(super) fn turn(t: f64) -> [[f64; 3]; 2] {
     let q = 1.0 + t * t;
     [
-        [(1.0 - t * t) / q, -4.0 * t / (q * q), (12.0 * t * t - 4.0) / q.powi(3)],
-        [2.0 * t / q, 2.0 * (1.0 - t * t) / (q * q), (4.0 * t.powi(3) - 12.0 * t) / q.powi(3)],
+        [
+            (1.0 - t * t) / q,
+            -4.0 * t / (q * q),
+            (12.0 * t * t - 4.0) / q.powi(3),
+        ],
+        [
+            2.0 * t / q,
+            2.0 * (1.0 - t * t) / (q * q),
+            (4.0 * t.powi(3) - 12.0 * t) / q.powi(3),
+        ],
     ]
 }

@@ -8,6 +8,7 @@ pub(super) mod scalar;
 pub(super) mod wide;
 
 use super::NurbsError;
+use super::cache::Run;
 use pulp::Arch;
 
 /// Which instructions the inner loops use. The results do not depend on it.
@@ -90,6 +91,25 @@ impl Default for Kernel {
     fn default() -> Self {
         Self::new(SimdLevel::Auto).expect("the automatic choice falls back to the plain loops")
     }
+}
+
+/// Curves over one table of basis functions, to be evaluated at all of its samples.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Curves<'a> {
+    /// Rows of basis values.
+    pub(super) basis: &'a [f64],
+    /// From a row to the next.
+    pub(super) stride: usize,
+    /// The runs of samples.
+    pub(super) runs: &'a [Run],
+    /// The degree.
+    pub(super) degree: usize,
+    /// Control points of a curve.
+    pub(super) control_points: usize,
+    /// Samples of a curve.
+    pub(super) samples: usize,
+    /// Weighted coordinates x, y, z and weights, curve after curve.
+    pub(super) net: [&'a [f64]; 4],
 }
 
 /// Rows of equal length in one slice: row i is `values[i * stride ..][..samples]`.

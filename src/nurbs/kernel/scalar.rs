@@ -4,14 +4,15 @@
 //!   fill      rows[q (p + 1) + a][s] = derivative of order q of N_{k-p+a} at sample s
 //!   sum       out[s] = ((N_0 c_0) + N_1 c_1) + ... + N_p c_p
 //!   project   out[s] = sum of A / sum of w
+//!   curves    out[s] = sum of A · (1 / sum of w), for many curves and all their spans
 //! ```
 //!
-//! All samples of a call lie in one span, so the c are the same for all. Products and sums are
+//! All samples of a call (but of `curves`) lie in one span, so the c are the same for all. Products and sums are
 //! rounded one by one.
 
 use super::super::MAX_DEGREE;
 use super::super::basis::SpanFactors;
-use super::Rows;
+use super::{Curves, Rows};
 
 /// Basis functions and derivatives up to `order` (0 to 2) of `samples`, from column `first` on.
 pub(in super::super) fn fill(
@@ -71,6 +72,25 @@ pub(in super::super) fn project(
         let w = sum_at(basis, stride, column, weights);
         for (control, out) in coordinates.iter().zip(out.iter_mut()) {
             out[column] = sum_at(basis, stride, column, &control[..=p]) / w;
+        }
+    }
+}
+
+/// The points of curves, with one division each; `out` holds x, y and z, curve after curve.
+pub(in super::super) fn curves(job: &Curves<'_>, out: [&mut [f64]; 3]) {
+    let count = job.net[3].len() / job.control_points;
+    for curve in 0..count {
+        let (from, to) = (curve * job.control_points, curve * job.samples);
+        for run in job.runs {
+            let first = from + run.span - job.degree;
+            let control = job.net.map(|c| &c[first..=first + job.degree]);
+            for column in run.window.clone() {
+                let r = 1.0 / sum_at(job.basis, job.stride, column, control[3]);
+                for axis in 0..3 {
+                    out[axis][to + column] =
+                        sum_at(job.basis, job.stride, column, control[axis]) * r;
+                }
+            }
         }
     }
 }

@@ -8,7 +8,7 @@
 
 use super::super::MAX_DEGREE;
 use super::super::basis::SpanFactors;
-use super::Rows;
+use super::{Curves, Rows};
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
 
@@ -276,6 +276,87 @@ fn dot<S: Simd>(simd: S, n: &[S::f64s], control: &[f64]) -> S::f64s {
     let mut total = times(simd, n[0], control[0]);
     for (&n, &c) in n.iter().zip(control).skip(1) {
         total = simd.add_f64s(total, times(simd, n, c));
+    }
+    total
+}
+
+/// Points of curves; see [`scalar::curves`](super::scalar::curves).
+#[derive(Debug)]
+pub(in super::super) struct CurvePoints<'a, 'b> {
+    /// The curves.
+    pub(in super::super) curves: &'a Curves<'a>,
+    /// x, y and z.
+    pub(in super::super) out: [&'b mut [f64]; 3],
+}
+
+impl WithSimd for CurvePoints<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for_degree!(self.curves.degree, curve_points::<S>(simd, self));
+    }
+}
+
+#[inline(always)]
+fn curve_points<S: Simd, const N: usize>(simd: S, job: CurvePoints<'_, '_>, p: usize) {
+    let zero = simd.splat_f64s(0.0);
+    let one = simd.splat_f64s(1.0);
+    let CurvePoints { curves, out } = job;
+    let [x, y, z] = out;
+    let (control_points, samples) = (curves.control_points, curves.samples);
+    let count = curves.net[3].len() / control_points;
+    let [mut cx, mut cy, mut cz, mut cw] = [[zero; N]; 4];
+    for curve in 0..count {
+        for run in curves.runs {
+            let first = curve * control_points + run.span - curves.degree;
+            for a in 0..=p {
+                cx[a] = simd.splat_f64s(curves.net[0][first + a]);
+                cy[a] = simd.splat_f64s(curves.net[1][first + a]);
+                cz[a] = simd.splat_f64s(curves.net[2][first + a]);
+                cw[a] = simd.splat_f64s(curves.net[3][first + a]);
+            }
+            let (start, end) = (run.window.start, run.window.end);
+            let to = curve * samples;
+            let (x, x_rest) = S::as_mut_simd_f64s(&mut x[to + start..to + end]);
+            let (y, y_rest) = S::as_mut_simd_f64s(&mut y[to + start..to + end]);
+            let (z, z_rest) = S::as_mut_simd_f64s(&mut z[to + start..to + end]);
+            let mut n = [zero; N];
+            for (i, ((x, y), z)) in x.iter_mut().zip(y).zip(z).enumerate() {
+                let column = start + i * S::F64_LANES;
+                for a in 0..=p {
+                    let at = a * curves.stride + column;
+                    n[a] = S::as_simd_f64s(&curves.basis[at..at + S::F64_LANES]).0[0];
+                }
+                let r = simd.div_f64s(one, lane_dot(simd, &n[..=p], &cw[..=p]));
+                *x = simd.mul_f64s(lane_dot(simd, &n[..=p], &cx[..=p]), r);
+                *y = simd.mul_f64s(lane_dot(simd, &n[..=p], &cy[..=p]), r);
+                *z = simd.mul_f64s(lane_dot(simd, &n[..=p], &cz[..=p]), r);
+            }
+            if !x_rest.is_empty() {
+                let column = end - x_rest.len();
+                for a in 0..=p {
+                    let at = a * curves.stride + column;
+                    n[a] = simd.partial_load_f64s(&curves.basis[at..at + x_rest.len()]);
+                }
+                let r = simd.div_f64s(one, lane_dot(simd, &n[..=p], &cw[..=p]));
+                let point = simd.mul_f64s(lane_dot(simd, &n[..=p], &cx[..=p]), r);
+                simd.partial_store_f64s(x_rest, point);
+                let point = simd.mul_f64s(lane_dot(simd, &n[..=p], &cy[..=p]), r);
+                simd.partial_store_f64s(y_rest, point);
+                let point = simd.mul_f64s(lane_dot(simd, &n[..=p], &cz[..=p]), r);
+                simd.partial_store_f64s(z_rest, point);
+            }
+        }
+    }
+}
+
+/// The sum of products of lanes, in order; there is at least one.
+#[inline(always)]
+fn lane_dot<S: Simd>(simd: S, n: &[S::f64s], control: &[S::f64s]) -> S::f64s {
+    let mut total = simd.mul_f64s(n[0], control[0]);
+    for (&n, &c) in n.iter().zip(control).skip(1) {
+        total = simd.add_f64s(total, simd.mul_f64s(n, c));
     }
     total
 }
