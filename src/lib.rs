@@ -54,6 +54,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod nurbs;
+pub mod patch;
 pub mod picture;
 pub mod region;
 pub mod sample;
