@@ -8,7 +8,7 @@
 //!   point reaches farther than 4 ε of the unit beyond it. A control point that is on the face and
 //!   reaches farthest is met exactly.
 
-use super::face_net::{Net, dot, real};
+use super::face_net::{Net, dot};
 use super::face_tree::{PatchTree, SubPatch};
 use smallvec::SmallVec;
 
@@ -81,10 +81,14 @@ fn raise(part: &SubPatch, n: [f64; 3], best: &mut f64, slack: &mut f64, visited:
                 }
             }
         }
-        let k = usize::from(bend[1] > bend[0]);
-        // Coefficients are within this of values of h: nothing above the slack is hidden.
-        let hidden = real(p * p) * bend[0] + real(q * q) * bend[1];
-        if sides[k] < f64::EPSILON || hidden <= 0.0 {
+        let bent = usize::from(bend[1] > bend[0]);
+        // A side that is used up leaves the other.
+        let k = if sides[bent] < f64::EPSILON {
+            1 - bent
+        } else {
+            bent
+        };
+        if sides[k] < f64::EPSILON {
             continue;
         }
         let (before, after) = net.split(k, 0.5);

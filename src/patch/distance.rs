@@ -163,7 +163,13 @@ fn minimise(part: &SubPatch, index: usize, q: [f64; 3], search: &mut Search) {
         if shape.proves(&foot, floor * floor, reach) {
             continue;
         }
-        let k = shape.direction(net);
+        let bent = shape.direction(net);
+        // A side that is used up leaves the other.
+        let k = if piece.sides[bent] < f64::EPSILON {
+            1 - bent
+        } else {
+            bent
+        };
         if piece.sides[k] < f64::EPSILON {
             // Nothing is left to halve; the piece is a point and its foot is that point.
             continue;
@@ -689,7 +695,7 @@ mod tests {
                     .collect(),
             };
             let mut best = (f64::INFINITY, 0.0, 0.0);
-            let mut look = |u: f64, v: f64, best: &mut (f64, f64, f64)| {
+            let look = |u: f64, v: f64, best: &mut (f64, f64, f64)| {
                 let d = (DVec3::from_array(super::cartesian(net.evaluate(u, v))) - p).length();
                 if d < best.0 {
                     *best = (d, u, v);

@@ -290,7 +290,7 @@ mod tests {
             ] {
                 let volume = laid(shape, order, reversed);
                 let inside = [DVec3::ZERO, DVec3::Z * 0.5, DVec3::ZERO, DVec3::ONE][index];
-                for face in outer_faces(&[volume.clone()]).expect("faces") {
+                for face in outer_faces(std::slice::from_ref(&volume)).expect("faces") {
                     let (x, n) = middle(&face);
                     // These are star-shaped about their middles.
                     assert!(n.dot(x - inside) > 0.0, "{index} {order:?} {face:?}");

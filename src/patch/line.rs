@@ -487,8 +487,8 @@ mod tests {
         // In the cap's plane, all of the chord is held.
         for disc in [biquadratic(), polar(TAU)] {
             let body = faces(&frustum(1.0, 1.0, 1.0, &disc));
-            for y in [0.0, 0.3, 0.7, 0.99] {
-                let half = (1.0 - y * y as f64).sqrt();
+            for y in [0.0_f64, 0.3, 0.7, 0.99] {
+                let half = (1.0 - y * y).sqrt();
                 let list = intervals(
                     &body,
                     DVec3::new(-2.0, y, 1.0),
