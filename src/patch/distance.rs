@@ -31,9 +31,7 @@
 //! * Source: Johnson, Cohen, *Minimum distance queries*, ACM CAD 1998 (the tree); MATH of this crate,
 //!   closest points to a rational span (the bound).
 
-use super::face_net::{
-    Net, Scalars, cartesian, dot, length, minus, real, squares,
-};
+use super::face_net::{Net, Scalars, cartesian, dot, length, minus, real, squares};
 use super::face_tree::{PatchTree, SubPatch};
 use smallvec::SmallVec;
 
@@ -165,7 +163,13 @@ fn minimise(part: &SubPatch, index: usize, q: [f64; 3], search: &mut Search) {
         if shape.proves(&foot, floor * floor, reach) {
             continue;
         }
-        let k = shape.direction(net);
+        let bent = shape.direction(net);
+        // A side that is used up leaves the other.
+        let k = if piece.sides[bent] < f64::EPSILON {
+            1 - bent
+        } else {
+            bent
+        };
         if piece.sides[k] < f64::EPSILON {
             // Nothing is left to halve; the piece is a point and its foot is that point.
             continue;
@@ -357,7 +361,11 @@ impl Shape {
     fn new(net: &Net, square: &[f64], weight: &[f64], d2: f64, noise: f64) -> Self {
         let [n, m] = net.degrees.map(|p| 2 * p);
         let width = n + 1;
-        let g: Scalars = square.iter().zip(weight).map(|(&f, &e)| f - d2 * e).collect();
+        let g: Scalars = square
+            .iter()
+            .zip(weight)
+            .map(|(&f, &e)| f - d2 * e)
+            .collect();
         let [p, q] = [n, m].map(real);
         let mut shape = Self {
             least: [f64::INFINITY; 2],
@@ -406,7 +414,10 @@ impl Shape {
         shape.mixed = (shape.mixed + slack) * p * q;
         for (k, n) in [p, q].into_iter().enumerate() {
             shape.least[k] = (shape.least[k] - slack) * n * (n - 1.0);
-            shape.rise[k] = [(shape.rise[k][0] - slack) * n, (shape.rise[k][1] + slack) * n];
+            shape.rise[k] = [
+                (shape.rise[k][0] - slack) * n,
+                (shape.rise[k][1] + slack) * n,
+            ];
             for edge in &mut shape.edges[1 - k] {
                 *edge = (*edge - slack) * n * (n - 1.0);
             }
@@ -477,7 +488,11 @@ mod tests {
     }
 
     /// The largest error over many points, as a share of size plus distance; feet are checked too.
-    fn worst(faces: &FaceSet, points: impl Iterator<Item = DVec3>, wanted: impl Fn(DVec3) -> f64) -> f64 {
+    fn worst(
+        faces: &FaceSet,
+        points: impl Iterator<Item = DVec3>,
+        wanted: impl Fn(DVec3) -> f64,
+    ) -> f64 {
         let mut worst = 0.0_f64;
         for p in points {
             let near = faces.nearest(p).expect("finite");
@@ -485,7 +500,12 @@ mod tests {
             let error = (near.distance - d).abs() / (1.0 + d);
             assert!(error <= 1e-12, "{} for {d} at {p} {near:?}", near.distance);
             assert!(((near.foot - p).length() - near.distance).abs() <= 1e-14 * (2.0 + d));
-            assert!(wanted(near.foot) <= 1e-14 * 4.0, "foot {} off by {:e}", near.foot, wanted(near.foot));
+            assert!(
+                wanted(near.foot) <= 1e-14 * 4.0,
+                "foot {} off by {:e}",
+                near.foot,
+                wanted(near.foot)
+            );
             assert_eq!(faces.distance(p, f64::INFINITY), near.distance);
             let below = 0.5 * d;
             assert_eq!(faces.distance(p, below), below);
@@ -588,7 +608,11 @@ mod tests {
         let faces = faces(&block([-1.0, -0.5, 0.0], [1.0, 0.5, 1.0]));
         let exact = |p: DVec3| {
             let out = (p - DVec3::new(0.0, 0.0, 0.5)).abs() - DVec3::new(1.0, 0.5, 0.5);
-            if out.max_element() <= 0.0 { -out.max_element() } else { out.max(DVec3::ZERO).length() }
+            if out.max_element() <= 0.0 {
+                -out.max_element()
+            } else {
+                out.max(DVec3::ZERO).length()
+            }
         };
         let worst = worst(&faces, points(5), exact);
         eprintln!("block: worst {worst:e}");
@@ -612,13 +636,21 @@ mod tests {
 
     #[test]
     fn scales_and_offsets() {
-        for (scale, offset, tolerance) in [(1e-6, 0.0, 1e-14), (1e6, 0.0, 1e-14), (1.0, 1e6, 1e-9), (1e-3, -2e3, 1e-9)] {
+        for (scale, offset, tolerance) in [
+            (1e-6, 0.0, 1e-14),
+            (1e6, 0.0, 1e-14),
+            (1.0, 1e6, 1e-9),
+            (1e-3, -2e3, 1e-9),
+        ] {
             let place = |p: [f64; 3]| p.map(|x| x * scale + offset);
             let faces = faces(&mapped(&ball(1.0, &biquadratic()), place));
             for p in points(6).take(100) {
                 let d = faces.distance(DVec3::from_array(place(p.to_array())), f64::INFINITY);
                 let wanted = (p.length() - 1.0).abs();
-                assert!((d / scale - wanted).abs() <= tolerance * (1.0 + wanted), "{scale} {offset} {p}");
+                assert!(
+                    (d / scale - wanted).abs() <= tolerance * (1.0 + wanted),
+                    "{scale} {offset} {p}"
+                );
             }
         }
     }
@@ -630,11 +662,21 @@ mod tests {
             let far = 10f64.powi(e);
             let p = DVec3::new(0.6 * far, -0.8 * far, 0.0);
             let near = faces.nearest(p).expect("finite");
-            assert!((near.distance - (far - 1.0)).abs() <= 4e-16 * far, "{e}: {near:?}");
-            assert!((near.foot - DVec3::new(0.6, -0.8, 0.0)).length() < 1e-6, "{e}: {near:?}");
+            assert!(
+                (near.distance - (far - 1.0)).abs() <= 4e-16 * far,
+                "{e}: {near:?}"
+            );
+            assert!(
+                (near.foot - DVec3::new(0.6, -0.8, 0.0)).length() < 1e-6,
+                "{e}: {near:?}"
+            );
             assert_eq!(faces.distance(p, 1.0), 1.0);
         }
-        assert!(faces.distance(DVec3::splat(f64::MAX), f64::INFINITY).is_finite());
+        assert!(
+            faces
+                .distance(DVec3::splat(f64::MAX), f64::INFINITY)
+                .is_finite()
+        );
         assert_eq!(faces.distance(DVec3::NAN, 3.0), 3.0);
         assert!(faces.nearest(DVec3::INFINITY).is_none());
     }
@@ -646,11 +688,14 @@ mod tests {
             let cell = &face.surface;
             let net = super::Net {
                 degrees: cell.degrees(),
-                points: cell.control_points().iter()
-                    .map(|h| [h.weighted[0], h.weighted[1], h.weighted[2], h.weight]).collect(),
+                points: cell
+                    .control_points()
+                    .iter()
+                    .map(|h| [h.weighted[0], h.weighted[1], h.weighted[2], h.weight])
+                    .collect(),
             };
             let mut best = (f64::INFINITY, 0.0, 0.0);
-            let mut look = |u: f64, v: f64, best: &mut (f64, f64, f64)| {
+            let look = |u: f64, v: f64, best: &mut (f64, f64, f64)| {
                 let d = (DVec3::from_array(super::cartesian(net.evaluate(u, v))) - p).length();
                 if d < best.0 {
                     *best = (d, u, v);
@@ -666,8 +711,21 @@ mod tests {
             let mut step = step;
             while step > 1e-9 {
                 let (d, u, v) = best;
-                for (a, b) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
-                    look((u + a * step).clamp(0.0, 1.0), (v + b * step).clamp(0.0, 1.0), &mut best);
+                for (a, b) in [
+                    (1.0, 0.0),
+                    (-1.0, 0.0),
+                    (0.0, 1.0),
+                    (0.0, -1.0),
+                    (1.0, 1.0),
+                    (-1.0, 1.0),
+                    (1.0, -1.0),
+                    (-1.0, -1.0),
+                ] {
+                    look(
+                        (u + a * step).clamp(0.0, 1.0),
+                        (v + b * step).clamp(0.0, 1.0),
+                        &mut best,
+                    );
                 }
                 if best.0 == d {
                     step *= 0.5;
@@ -683,14 +741,19 @@ mod tests {
         let mut worst = 0.0_f64;
         for seed in 0..6 {
             let mut numbers = Numbers(seed);
-            let by: Vec<f64> = (0..108).map(|_| numbers.next().expect("endless") * 0.5 - 0.25).collect();
+            let by: Vec<f64> = (0..108)
+                .map(|_| numbers.next().expect("endless") * 0.5 - 0.25)
+                .collect();
             let faces = faces(&bent(&by));
             for _ in 0..12 {
                 let p = numbers.point(-0.5, 2.5);
                 let d = faces.distance(p, f64::INFINITY);
                 let b = brute(&faces, p, 40);
                 // A grid and a pattern search from its best point nearly always end in the least.
-                assert!(d <= b + 1e-13 && d >= b - 1e-9, "{d} {b} at {p} seed {seed}");
+                assert!(
+                    d <= b + 1e-13 && d >= b - 1e-9,
+                    "{d} {b} at {p} seed {seed}"
+                );
                 worst = worst.max((d - b).abs());
             }
         }

@@ -152,9 +152,8 @@ impl Face {
     }
 
     fn publish(&self, frame: &Frame) -> Result<OuterFace, NurbsError> {
-        let points = (self.net.points.iter()).map(|&p| {
-            Homogeneous::from_point(frame.model(cartesian(p)).to_array(), p[3])
-        });
+        let points = (self.net.points.iter())
+            .map(|&p| Homogeneous::from_point(frame.model(cartesian(p)).to_array(), p[3]));
         Ok(OuterFace {
             surface: BezierCell::new(self.net.degrees, points.collect())?,
             outward: self.outward,
@@ -278,7 +277,9 @@ fn row_to_bezier(
     let (knots, row) = clamp(knots, row)?;
     let mut inserted = Vec::new();
     for span in knots.spans().skip(1) {
-        let missing = knots.degree().saturating_sub(knots.multiplicity(span.start));
+        let missing = knots
+            .degree()
+            .saturating_sub(knots.multiplicity(span.start));
         inserted.extend(std::iter::repeat_n(span.start, missing));
     }
     Ok(refine_knots(&knots, &row, &inserted)?.1)
@@ -394,9 +395,8 @@ fn jacobian_sign(volume: &NurbsVolume, cell: [[f64; 2]; 3]) -> Result<i8, NurbsE
 fn is_collapsed(net: &Net) -> bool {
     let [n, m] = net.degrees.map(|p| 3 * p);
     let first = cartesian(net.points[0]);
-    let extent = (net.points.iter()).fold(0.0_f64, |e, &p| {
-        e.max(length(minus(cartesian(p), first)))
-    });
+    let extent =
+        (net.points.iter()).fold(0.0_f64, |e, &p| e.max(length(minus(cartesian(p), first))));
     let most = COINCIDE * extent;
     // Chebyshev's points: a polynomial small on them is small between them.
     let at = |i: usize, n: usize| {

@@ -51,7 +51,9 @@ fn drop_equal(faces: Vec<Face>) -> Vec<Face> {
             continue;
         }
         // Four corners, each off by the tolerance at most.
-        let near = keys[place + 1..].iter().take_while(|(other, _)| other - key <= 8.0 * COINCIDE);
+        let near = keys[place + 1..]
+            .iter()
+            .take_while(|(other, _)| other - key <= 8.0 * COINCIDE);
         for &(_, other) in near {
             if !dropped[other] && is_same(&faces[index].net, &faces[other].net) {
                 (dropped[index], dropped[other]) = (true, true);
@@ -64,7 +66,10 @@ fn drop_equal(faces: Vec<Face>) -> Vec<Face> {
 
 fn keep(faces: Vec<Face>, dropped: &[bool]) -> Vec<Face> {
     let pairs = faces.into_iter().zip(dropped);
-    pairs.filter(|(_, dropped)| !**dropped).map(|(face, _)| face).collect()
+    pairs
+        .filter(|(_, dropped)| !**dropped)
+        .map(|(face, _)| face)
+        .collect()
 }
 
 /// Whether two nets are one surface, up to the order of their parameters and a factor of the
@@ -93,8 +98,7 @@ fn is_same(a: &Net, b: &Net) -> bool {
         let (a, b) = (a.elevated(degrees), b.elevated(degrees));
         let factor = b.points[0][3] / a.points[0][3];
         let same = a.points.iter().zip(&b.points).all(|(&p, &q)| {
-            (q[3] - factor * p[3]).abs() <= COINCIDE * q[3]
-                && coincide(cartesian(p), cartesian(q))
+            (q[3] - factor * p[3]).abs() <= COINCIDE * q[3] && coincide(cartesian(p), cartesian(q))
         });
         if same {
             return true;
@@ -122,6 +126,7 @@ impl Candidate {
         }
     }
 
+    /// Whether the boxes around the control points meet.
     fn meets(&self, other: &Self) -> bool {
         (0..3).all(|c| {
             self.low[c] <= other.high[c] + COINCIDE && other.low[c] <= self.high[c] + COINCIDE
@@ -135,14 +140,15 @@ impl Candidate {
         let mut cuts = [Cuts::new(), Cuts::new()];
         let own = corners(&self.face.net);
         for corner in corners(other) {
-            let outside = (0..3).any(|c| {
-                corner[c] < self.low[c] - COINCIDE || corner[c] > self.high[c] + COINCIDE
-            });
+            let outside = (0..3)
+                .any(|c| corner[c] < self.low[c] - COINCIDE || corner[c] > self.high[c] + COINCIDE);
             if outside || own.iter().any(|&x| coincide(x, corner)) {
                 continue;
             }
             let face = &self.face.net;
-            let tree = self.tree.get_or_insert_with(|| PatchTree::new([face].into_iter()));
+            let tree = self
+                .tree
+                .get_or_insert_with(|| PatchTree::new([face].into_iter()));
             let Some(at) = locate(tree, corner, COINCIDE) else {
                 continue;
             };
@@ -193,9 +199,8 @@ fn cut_and_pair(faces: Vec<Face>) -> Vec<Face> {
             }
             let ours = one.cuts(&done[index].face.net);
             let theirs = done[index].cuts(&one.face.net);
-            if ours.iter().chain(&theirs).all(|list| list.is_empty()) {
-                continue;
-            }
+            // Nothing to cut: the parts are the faces themselves, and cutting others may have made
+            // them equal.
             let (a, b) = (one.parts(&ours), done[index].parts(&theirs));
             let mut gone = [vec![false; a.len()], vec![false; b.len()]];
             for i in 0..a.len() {
@@ -215,4 +220,200 @@ fn cut_and_pair(faces: Vec<Face>) -> Vec<Face> {
         done.push(one);
     }
     done.into_iter().map(|candidate| candidate.face).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::face_testing::{
+        area, ball, bent, biquadratic, block, frustum, laid, mapped, polar, torus,
+    };
+    use super::super::{FaceSet, outer_faces};
+    use crate::nurbs::NurbsVolume;
+    use glam::DVec3;
+    use std::f64::consts::{PI, TAU};
+
+    fn count(patches: &[NurbsVolume]) -> usize {
+        outer_faces(patches).expect("faces").len()
+    }
+
+    /// Sum of the areas of the outer faces.
+    fn total(patches: &[NurbsVolume]) -> f64 {
+        outer_faces(patches).expect("faces").iter().map(area).sum()
+    }
+
+    #[test]
+    fn seams_axes_and_poles_are_not_faces() {
+        assert_eq!(count(&[frustum(1.0, 1.0, 1.0, &biquadratic())]), 6);
+        assert_eq!(count(&[frustum(1.0, 1.0, 1.0, &polar(TAU))]), 12);
+        // A cone's tip is a point.
+        assert_eq!(count(&[frustum(1.0, 0.0, 1.0, &polar(TAU))]), 8);
+        // A quarter has two flat faces through the axis.
+        assert_eq!(count(&[frustum(1.0, 1.0, 1.0, &polar(TAU / 4.0))]), 5);
+        assert_eq!(count(&[ball(1.0, &biquadratic())]), 8);
+        assert_eq!(count(&[ball(1.0, &polar(TAU))]), 8);
+        assert_eq!(count(&[torus(1.0, 0.4, TAU)]), 16);
+        assert_eq!(count(&[torus(1.0, 0.4, PI)]), 10);
+        let areas = [
+            (frustum(1.0, 1.0, 1.0, &biquadratic()), 4.0 * PI),
+            (
+                frustum(1.0, 0.0, 1.0, &polar(TAU)),
+                PI * (1.0 + 2f64.sqrt()),
+            ),
+            (ball(1.0, &polar(TAU)), 4.0 * PI),
+            (torus(1.0, 0.4, TAU), 4.0 * PI * PI * 0.4),
+            (torus(1.0, 0.4, PI), 2.0 * PI * PI * 0.4 + 2.0 * PI * 0.16),
+        ];
+        for (volume, wanted) in areas {
+            let found = total(&[volume]);
+            assert!((found - wanted).abs() < 1e-7, "{found} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn faces_point_outward() {
+        let middle = |face: &super::super::OuterFace| {
+            let (x, n) = super::super::face_testing::normal(face, [0.4, 0.6]);
+            (x, n * f64::from(face.outward))
+        };
+        let shapes = [
+            block([-1.0; 3], [1.0; 3]),
+            frustum(1.0, 1.0, 1.0, &biquadratic()),
+            ball(1.0, &polar(TAU)),
+            bent(&[0.0, 0.1, -0.1, 0.05, -0.07]),
+        ];
+        for (index, shape) in shapes.iter().enumerate() {
+            for (order, reversed) in [
+                ([0, 1, 2], [false; 3]),
+                ([1, 0, 2], [false; 3]),
+                ([2, 0, 1], [true, false, false]),
+                ([0, 2, 1], [true, false, true]),
+            ] {
+                let volume = laid(shape, order, reversed);
+                let inside = [DVec3::ZERO, DVec3::Z * 0.5, DVec3::ZERO, DVec3::ONE][index];
+                for face in outer_faces(std::slice::from_ref(&volume)).expect("faces") {
+                    let (x, n) = middle(&face);
+                    // These are star-shaped about their middles.
+                    assert!(n.dot(x - inside) > 0.0, "{index} {order:?} {face:?}");
+                    let at = volume
+                        .evaluate(face.volume_parameters([0.4, 0.6]))
+                        .expect("inside");
+                    assert!((DVec3::from_array(at) - x).length() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_share_a_face_however_their_parameters_lie() {
+        let right = block([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]);
+        let left = block([0.0; 3], [1.0; 3]);
+        for order in [
+            [0, 1, 2],
+            [1, 0, 2],
+            [2, 1, 0],
+            [1, 2, 0],
+            [2, 0, 1],
+            [0, 2, 1],
+        ] {
+            for bits in 0..8 {
+                let reversed = [0, 1, 2].map(|k| bits >> k & 1 == 1);
+                let right = laid(&right, order, reversed);
+                assert_eq!(
+                    count(&[left.clone(), right.clone()]),
+                    10,
+                    "{order:?} {bits}"
+                );
+            }
+        }
+        // Of degree two, at another weight, and far from the origin.
+        let heavy = mapped(&bent(&[0.0]), |[x, y, z]| {
+            [1e5 + 1.0 + 0.5 * x, 0.5 * y, 0.5 * z]
+        });
+        let near = block([1e5, 0.0, 0.0], [1e5 + 1.0, 1.0, 1.0]);
+        let heavy = NurbsVolume::new(
+            heavy.knots().clone(),
+            heavy.control_points().to_vec(),
+            vec![3.0; 27],
+        )
+        .expect("a cube");
+        assert_eq!(count(&[near.clone(), heavy]), 10);
+        // Not quite touching.
+        let apart = block([1e5 + 1.000_001, 0.0, 0.0], [1e5 + 2.0, 1.0, 1.0]);
+        assert_eq!(count(&[near, apart]), 12);
+    }
+
+    #[test]
+    fn larger_faces_are_cut_by_smaller_ones() {
+        // An L: its top is cut where the other block stands.
+        let l = [
+            block([0.0; 3], [2.0, 1.0, 1.0]),
+            laid(
+                &block([0.0, 0.0, 1.0], [1.0, 1.0, 2.0]),
+                [2, 0, 1],
+                [false, true, false],
+            ),
+        ];
+        assert_eq!(count(&l), 11);
+        assert!((total(&l) - 14.0).abs() < 1e-12);
+        let faces = FaceSet::new(&l).expect("faces");
+        let on_joint = faces.distance(DVec3::new(0.5, 0.5, 1.0), f64::INFINITY);
+        assert!((on_joint - 0.5).abs() < 1e-14, "{on_joint}");
+
+        // A block covered by three; and two by two that overlap like bricks.
+        let covered = [
+            block([0.0; 3], [3.0, 1.0, 1.0]),
+            block([0.0, 0.0, 1.0], [0.7, 1.0, 2.0]),
+            block([0.7, 0.0, 1.0], [2.1, 1.0, 2.0]),
+            block([2.1, 0.0, 1.0], [3.0, 1.0, 2.0]),
+        ];
+        assert!(
+            (total(&covered) - 22.0).abs() < 1e-11,
+            "{}",
+            total(&covered)
+        );
+        let bricks = [
+            block([0.0; 3], [1.0, 1.0, 1.0]),
+            block([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]),
+            block([0.0, 0.0, 1.0], [1.3, 1.0, 2.0]),
+            block([1.3, 0.0, 1.0], [2.0, 1.0, 2.0]),
+        ];
+        assert!((total(&bricks) - 16.0).abs() < 1e-11, "{}", total(&bricks));
+
+        // A stud in the middle of a plate leaves eight parts of the plate's top.
+        let stud = [
+            block([0.0; 3], [3.0, 3.0, 1.0]),
+            block([1.0, 1.2, 1.0], [2.0, 2.0, 1.5]),
+        ];
+        assert_eq!(count(&stud), 5 + 8 + 5);
+        assert!((total(&stud) - (18.0 + 12.0 + 2.0 * 0.5 * 1.8)).abs() < 1e-11);
+    }
+
+    #[test]
+    fn curved_faces_are_cut_too() {
+        // A thin cylinder on a thick one: the ring around it stays.
+        let up = |v: &NurbsVolume| mapped(v, |[x, y, z]| [x, y, z + 1.0]);
+        let stack = [
+            frustum(1.0, 1.0, 1.0, &polar(TAU)),
+            up(&frustum(0.5, 0.5, 1.0, &polar(TAU))),
+        ];
+        assert_eq!(count(&stack), 4 + 4 + 4 + 4 + 4);
+        let found = total(&stack);
+        assert!((found - 5.0 * PI).abs() < 1e-7, "{found}");
+        let faces = FaceSet::new(&stack).expect("faces");
+        for z in [0.9, 1.0, 1.1] {
+            let wanted = if z < 1.0 { 0.5_f64.hypot(1.0 - z) } else { 0.5 };
+            let found = faces.distance(DVec3::new(0.0, 0.0, z), f64::INFINITY);
+            assert!(
+                (found - wanted).abs() < 1e-13,
+                "{found} for {wanted} at {z}"
+            );
+        }
+        // A quarter on a full turn: one of four sectors.
+        let quarter = up(&frustum(1.0, 1.0, 1.0, &polar(TAU / 4.0)));
+        assert_eq!(count(&[frustum(1.0, 1.0, 1.0, &polar(TAU)), quarter]), 15);
+        // Two halves of a ring, one turned by half a turn.
+        let half = torus(1.0, 0.4, PI);
+        let other = mapped(&half, |[x, y, z]| [-x, -y, z]);
+        assert_eq!(count(&[half, other]), 16);
+    }
 }

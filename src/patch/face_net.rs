@@ -280,10 +280,7 @@ impl Net {
             degrees[direction] = n + 1;
             let mut out = Self {
                 degrees,
-                points: SmallVec::from_elem(
-                    [0.0; 4],
-                    (degrees[0] + 1) * (degrees[1] + 1),
-                ),
+                points: SmallVec::from_elem([0.0; 4], (degrees[0] + 1) * (degrees[1] + 1)),
             };
             let new = out.stride(direction);
             for (from, to) in net.rows(direction).zip(out.rows(direction)) {
@@ -375,9 +372,7 @@ impl Net {
             for i in 2..=n {
                 let [a, b, c] = [get(i - 2), get(i - 1), get(i)];
                 let [x, y, z] = [a, b, c].map(cartesian);
-                second = second.max(length(std::array::from_fn(|k| {
-                    x[k] - 2.0 * y[k] + z[k]
-                })));
+                second = second.max(length(std::array::from_fn(|k| x[k] - 2.0 * y[k] + z[k])));
                 weight2 = weight2.max((c[3] - a[3]).abs());
             }
         }
@@ -392,8 +387,7 @@ impl Net {
         for start in self.rows(direction) {
             let mut sum = 0.0;
             for i in 0..n {
-                let [a, b] =
-                    [i, i + 1].map(|i| cartesian(self.points[start + i * stride]));
+                let [a, b] = [i, i + 1].map(|i| cartesian(self.points[start + i * stride]));
                 sum += length(minus(b, a));
             }
             most = most.max(sum);
@@ -462,7 +456,10 @@ mod tests {
             )
             .prop_map(move |c| Net {
                 degrees: [p, q],
-                points: c.iter().map(|&(x, y, z, w)| [x * w, y * w, z * w, w]).collect(),
+                points: c
+                    .iter()
+                    .map(|&(x, y, z, w)| [x * w, y * w, z * w, w])
+                    .collect(),
             })
         })
     }

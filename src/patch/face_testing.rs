@@ -34,7 +34,15 @@ fn arc(angle: f64) -> (KnotVector, Vec<Flat>) {
             ((0.5 * step).cos(), 1.0 / (0.5 * step).cos())
         };
         // Multiples of a right angle, and of half of one, are exact.
-        let snap = |x: f64| if x.abs() < 1e-15 { 0.0 } else if (x.abs() - 1.0).abs() < 1e-15 { x.signum() } else { x };
+        let snap = |x: f64| {
+            if x.abs() < 1e-15 {
+                0.0
+            } else if (x.abs() - 1.0).abs() < 1e-15 {
+                x.signum()
+            } else {
+                x
+            }
+        };
         points.push(([snap(radius * a.cos()), snap(radius * a.sin())], weight));
     }
     let mut list = vec![0.0; 3];
@@ -53,9 +61,15 @@ fn arc(angle: f64) -> (KnotVector, Vec<Flat>) {
 pub(super) fn biquadratic() -> Disc {
     let s = FRAC_1_SQRT_2;
     let flat = [
-        [-s, -s], [0.0, -2.0 * s], [s, -s],
-        [-2.0 * s, 0.0], [0.0, 0.0], [2.0 * s, 0.0],
-        [-s, s], [0.0, 2.0 * s], [s, s],
+        [-s, -s],
+        [0.0, -2.0 * s],
+        [s, -s],
+        [-2.0 * s, 0.0],
+        [0.0, 0.0],
+        [2.0 * s, 0.0],
+        [-s, s],
+        [0.0, 2.0 * s],
+        [s, s],
     ];
     let weights = [1.0, s, 1.0, s, 1.0, s, 1.0, s, 1.0];
     // Times (-s, s): a turn by 135 degrees.
@@ -69,7 +83,10 @@ pub(super) fn biquadratic() -> Disc {
 /// The unit disc, or a sector of it, with rays as the first parameter.
 pub(super) fn polar(angle: f64) -> Disc {
     let (circle, rim) = arc(angle);
-    let points = rim.iter().flat_map(|&(x, w)| [([0.0; 2], w), (x, w)]).collect();
+    let points = rim
+        .iter()
+        .flat_map(|&(x, w)| [([0.0; 2], w), (x, w)])
+        .collect();
     Disc {
         knots: [bezier(1), circle],
         points,
@@ -91,7 +108,11 @@ pub(super) fn turned(curve: &KnotVector, meridian: &[Flat], disc: &Disc) -> Nurb
 
 /// A cylinder or a truncated cone from z = 0 to `height`.
 pub(super) fn frustum(low: f64, high: f64, height: f64, disc: &Disc) -> NurbsVolume {
-    turned(&bezier(1), &[([low, 0.0], 1.0), ([high, height], 1.0)], disc)
+    turned(
+        &bezier(1),
+        &[([low, 0.0], 1.0), ([high, height], 1.0)],
+        disc,
+    )
 }
 
 /// A ball about the origin.
@@ -99,7 +120,13 @@ pub(super) fn ball(radius: f64, disc: &Disc) -> NurbsVolume {
     let (r, s) = (radius, FRAC_1_SQRT_2);
     turned(
         &knots(2, &[0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0]),
-        &[([0.0, -r], 1.0), ([r, -r], s), ([r, 0.0], 1.0), ([r, r], s), ([0.0, r], 1.0)],
+        &[
+            ([0.0, -r], 1.0),
+            ([r, -r], s),
+            ([r, 0.0], 1.0),
+            ([r, r], s),
+            ([0.0, r], 1.0),
+        ],
         disc,
     )
 }
@@ -122,11 +149,14 @@ pub(super) fn torus(large: f64, small: f64, angle: f64) -> NurbsVolume {
 
 /// The box between two corners, trilinear.
 pub(super) fn block(low: [f64; 3], high: [f64; 3]) -> NurbsVolume {
-    let points = (0..8).map(|i| {
-        std::array::from_fn(|c| if i >> c & 1 == 0 { low[c] } else { high[c] })
-    });
-    NurbsVolume::new([bezier(1), bezier(1), bezier(1)], points.collect(), vec![1.0; 8])
-        .expect("a box")
+    let points =
+        (0..8).map(|i| std::array::from_fn(|c| if i >> c & 1 == 0 { low[c] } else { high[c] }));
+    NurbsVolume::new(
+        [bezier(1), bezier(1), bezier(1)],
+        points.collect(),
+        vec![1.0; 8],
+    )
+    .expect("a box")
 }
 
 /// A cube of 3 x 3 x 3 control points, each moved by a part of `by` and weighted.
@@ -159,7 +189,11 @@ pub(super) fn laid(volume: &NurbsVolume, order: [usize; 3], reversed: [bool; 3])
         ];
         let mut old = [0; 3];
         for k in 0..3 {
-            old[order[k]] = if reversed[k] { new_counts[k] - 1 - index[k] } else { index[k] };
+            old[order[k]] = if reversed[k] {
+                new_counts[k] - 1 - index[k]
+            } else {
+                index[k]
+            };
         }
         let from = old[0] + counts[0] * (old[1] + counts[1] * old[2]);
         points.push(volume.control_points()[from]);
@@ -167,7 +201,11 @@ pub(super) fn laid(volume: &NurbsVolume, order: [usize; 3], reversed: [bool; 3])
     }
     let knots = [0, 1, 2].map(|k| {
         let knots = &volume.knots()[order[k]];
-        if reversed[k] { knots.reversed().expect("reversed") } else { knots.clone() }
+        if reversed[k] {
+            knots.reversed().expect("reversed")
+        } else {
+            knots.clone()
+        }
     });
     NurbsVolume::new(knots, points, weights).expect("laid")
 }
@@ -191,4 +229,46 @@ impl Numbers {
         let mut x = || low + (high - low) * self.next().expect("endless");
         glam::DVec3::new(x(), x(), x())
     }
+}
+
+fn net_of(face: &super::OuterFace) -> super::face_net::Net {
+    let points = face.surface.control_points().iter();
+    super::face_net::Net {
+        degrees: face.surface.degrees(),
+        points: points
+            .map(|h| [h.weighted[0], h.weighted[1], h.weighted[2], h.weight])
+            .collect(),
+    }
+}
+
+/// A point of a face and X_u × X_v there.
+pub(super) fn normal(face: &super::OuterFace, at: [f64; 2]) -> (glam::DVec3, glam::DVec3) {
+    let jet = net_of(face).jet(at[0], at[1]);
+    let vector = |p: [f64; 4]| glam::DVec3::new(p[0], p[1], p[2]);
+    let w = jet.value[3];
+    let x = vector(jet.value) / w;
+    let slope = |d: [f64; 4]| (vector(d) - x * d[3]) / w;
+    (x, slope(jet.u).cross(slope(jet.v)))
+}
+
+/// The area of a face, by Gauss's rule of three points on a grid of squares.
+pub(super) fn area(face: &super::OuterFace) -> f64 {
+    const PARTS: usize = 8;
+    let rule = [
+        (0.112_701_665_379_258_3, 5.0 / 18.0),
+        (0.5, 4.0 / 9.0),
+        (0.887_298_334_620_741_7, 5.0 / 18.0),
+    ];
+    let mut sum = 0.0;
+    for i in 0..PARTS {
+        for j in 0..PARTS {
+            for (u, a) in rule {
+                for (v, b) in rule {
+                    let at = [(i as f64 + u) / PARTS as f64, (j as f64 + v) / PARTS as f64];
+                    sum += a * b * normal(face, at).1.length();
+                }
+            }
+        }
+    }
+    sum / (PARTS * PARTS) as f64
 }

@@ -250,7 +250,11 @@ fn cut(face: &Net, index: u32, bend: f64, parts: &mut Vec<SubPatch>) {
     while let Some((net, low, sides, halvings)) = work.pop() {
         let bent = |k: usize| {
             let b = net.bend(k);
-            if halvings[k] < HALVINGS && b > bend { b * net.extent(k) } else { 0.0 }
+            if halvings[k] < HALVINGS && b > bend {
+                b * net.extent(k)
+            } else {
+                0.0
+            }
         };
         let (a, b) = (bent(0), bent(1));
         if a == 0.0 && b == 0.0 {

@@ -66,18 +66,16 @@ pub(super) fn search(
 
 impl Line {
     /// `None` where the numbers say nothing.
-    fn new(
-        frame: &Frame,
-        start: DVec3,
-        along: DVec3,
-        range: [f64; 2],
-        error: f64,
-    ) -> Option<Self> {
+    fn new(frame: &Frame, start: DVec3, along: DVec3, range: [f64; 2], error: f64) -> Option<Self> {
         let local = frame.local(start);
         let step = (along / frame.unit).to_array();
         let speed = length(step);
         let error = error.max(0.0) / frame.unit;
-        let finite = local.iter().chain(&step).chain(&range).all(|x| x.is_finite());
+        let finite = local
+            .iter()
+            .chain(&step)
+            .chain(&range)
+            .all(|x| x.is_finite());
         if !(finite && error.is_finite() && speed > 0.0 && speed.is_finite()) {
             return None;
         }
@@ -252,7 +250,11 @@ impl View {
                 return None;
             }
             if most - least <= 8.0 * error {
-                view.spent = true;
+                // Seen edge-on. A thin strip that one parameter runs along can still be halved; one
+                // that both run along would fall into ever more pieces.
+                let [a, b] = [0, 1].map(|k| net_extent(net, k));
+                view.spent = a.min(b) > 16.0 * error;
+                view.clip = Clip::Halve(usize::from(b > a));
                 return Some(view);
             }
         }
@@ -282,7 +284,11 @@ impl View {
             let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
             for (j, row) in net.points.chunks_exact(p + 1).enumerate() {
                 for (i, x) in row.iter().enumerate() {
-                    let linear = if k == 0 { real(i) / real(p) } else { real(j) / real(q) };
+                    let linear = if k == 0 {
+                        real(i) / real(p)
+                    } else {
+                        real(j) / real(q)
+                    };
                     let off = linear - (rows[k][0] * x[0] + rows[k][1] * x[1]);
                     least = least.min(off);
                     most = most.max(off);
@@ -308,4 +314,306 @@ impl View {
 /// Largest length, seen along the line, of a control polygon along `direction`.
 fn net_extent(net: &Net, direction: usize) -> f64 {
     net.map(|p| [p[0], p[1], 0.0, p[3]]).extent(direction)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::FaceSet;
+    use super::super::face_testing::{
+        Numbers, ball, bent, biquadratic, block, frustum, mapped, polar, torus,
+    };
+    use crate::nurbs::NurbsVolume;
+    use glam::DVec3;
+    use std::f64::consts::TAU;
+
+    fn faces(volume: &NurbsVolume) -> FaceSet {
+        FaceSet::new(std::slice::from_ref(volume)).expect("faces")
+    }
+
+    const ERROR: f64 = 1e-14;
+
+    fn intervals(faces: &FaceSet, start: DVec3, along: DVec3, range: [f64; 2]) -> Vec<[f64; 2]> {
+        let mut found = Vec::new();
+        faces.line(start, along, range, ERROR, &mut |a, b| {
+            assert!(a <= b && a >= range[0] && b <= range[1], "{a} {b}");
+            found.push([a, b]);
+        });
+        found
+    }
+
+    fn holds(list: &[[f64; 2]], s: f64, slack: f64) -> bool {
+        list.iter().any(|&[a, b]| a - slack <= s && s <= b + slack)
+    }
+
+    /// Every crossing is held, and integers are held only next to a crossing.
+    fn check(faces: &FaceSet, start: DVec3, along: DVec3, crossings: &[f64]) {
+        let range = [-1.0, 100.0];
+        let list = intervals(faces, start, along, range);
+        for &s in crossings.iter().filter(|&&s| s > range[0] && s < range[1]) {
+            assert!(
+                holds(&list, s, 1e-10),
+                "{s} of {crossings:?} not in {list:?}, {start} {along}"
+            );
+        }
+        for &[a, b] in &list {
+            if a.ceil() <= b.floor() {
+                let at = start + along * a.ceil();
+                let off = faces.distance(at, f64::INFINITY);
+                assert!(
+                    off <= 1e-7,
+                    "[{a}, {b}] holds an integer {off} away from the faces"
+                );
+            }
+        }
+        assert!(list.len() <= 64, "{} intervals", list.len());
+    }
+
+    fn sphere(start: DVec3, along: DVec3, centre: DVec3, radius: f64) -> Vec<f64> {
+        let p = start - centre;
+        let (a, b, c) = (
+            along.length_squared(),
+            p.dot(along),
+            p.length_squared() - radius * radius,
+        );
+        let disc = b * b - a * c;
+        if disc < 1e-9 * a {
+            return Vec::new();
+        }
+        vec![(-b - disc.sqrt()) / a, (-b + disc.sqrt()) / a]
+    }
+
+    fn cylinder(start: DVec3, along: DVec3) -> Vec<f64> {
+        let (p, d) = (start.truncate(), along.truncate());
+        let mut list = Vec::new();
+        let (a, b, c) = (d.length_squared(), p.dot(d), p.length_squared() - 1.0);
+        let disc = b * b - a * c;
+        if disc > 1e-9 * a {
+            list.extend([(-b - disc.sqrt()) / a, (-b + disc.sqrt()) / a]);
+        }
+        list.retain(|s| (0.0..=1.0).contains(&(start.z + s * along.z)));
+        for z in [0.0, 1.0] {
+            let s = (z - start.z) / along.z;
+            if s.is_finite() && (p + d * s).length() <= 1.0 {
+                list.push(s);
+            }
+        }
+        list
+    }
+
+    #[test]
+    fn slanted_lines_through_round_solids() {
+        let mut numbers = Numbers(11);
+        let balls = [biquadratic(), polar(TAU)].map(|d| faces(&ball(1.0, &d)));
+        let cylinders = [biquadratic(), polar(TAU)].map(|d| faces(&frustum(1.0, 1.0, 1.0, &d)));
+        for _ in 0..300 {
+            let (from, to) = (numbers.point(-1.5, 1.5), numbers.point(-1.5, 1.5));
+            let along = (to - from) / 50.0;
+            let start = from - 20.0 * along;
+            for ball in &balls {
+                check(ball, start, along, &sphere(start, along, DVec3::ZERO, 1.0));
+            }
+            for body in &cylinders {
+                check(body, start, along, &cylinder(start, along));
+            }
+        }
+    }
+
+    #[test]
+    fn rows_through_axes_seams_and_corners() {
+        let ball = faces(&ball(1.0, &polar(TAU)));
+        let body = faces(&frustum(1.0, 1.0, 1.0, &polar(TAU)));
+        for i in 0..=20 {
+            for along in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let off = f64::from(i) * 0.05;
+                let aside = DVec3::new(along.z, along.x, along.y);
+                let along = along * 0.0625;
+                // Crossings at integers too: 1 / 0.0625 is one.
+                let start = aside * off - along * 32.0;
+                check(&ball, start, along, &sphere(start, along, DVec3::ZERO, 1.0));
+                let start = start + DVec3::Z * 0.25;
+                check(&body, start, along, &cylinder(start, along));
+            }
+        }
+        // Through the corners of a block.
+        let block = faces(&block([0.0; 3], [1.0; 3]));
+        let start = DVec3::splat(-1.0);
+        check(&block, start, DVec3::splat(0.125), &[8.0, 16.0]);
+        check(&block, start, DVec3::splat(0.3), &[10.0 / 3.0, 20.0 / 3.0]);
+        // Past a corner: no face is met.
+        let past = intervals(
+            &block,
+            DVec3::new(1.01, -1.0, 0.5),
+            DVec3::Y * 0.1,
+            [-1.0, 99.0],
+        );
+        assert!(past.is_empty(), "{past:?}");
+    }
+
+    #[test]
+    fn tori_have_four_crossings() {
+        let (large, small) = (1.0, 0.4);
+        let body = faces(&torus(large, small, TAU));
+        let mut numbers = Numbers(12);
+        let mut four = 0;
+        for _ in 0..200 {
+            let (from, to) = (numbers.point(-1.5, 1.5), numbers.point(-1.0, 1.0));
+            let along = (to - from) / 40.0;
+            let start = from;
+            // (|x|² + R² - r²)² - 4 R² (x² + y²), sampled signs bracket its roots.
+            let f = |s: f64| {
+                let p = start + along * s;
+                let k = p.length_squared() + large * large - small * small;
+                k * k - 4.0 * large * large * p.truncate().length_squared()
+            };
+            let mut roots = Vec::new();
+            for i in 0..2020 {
+                let (mut a, mut b) = (-1.0 + f64::from(i) * 0.05, -0.95 + f64::from(i) * 0.05);
+                if f(a) * f(b) < 0.0 {
+                    for _ in 0..60 {
+                        let m = 0.5 * (a + b);
+                        if f(a) * f(m) <= 0.0 { b = m } else { a = m }
+                    }
+                    roots.push(a);
+                }
+            }
+            four += usize::from(roots.len() == 4);
+            check(&body, start, along, &roots);
+        }
+        assert!(four > 5, "{four}");
+    }
+
+    #[test]
+    fn lines_in_faces_and_along_them() {
+        // In the cap's plane, all of the chord is held.
+        for disc in [biquadratic(), polar(TAU)] {
+            let body = faces(&frustum(1.0, 1.0, 1.0, &disc));
+            for y in [0.0_f64, 0.3, 0.7, 0.99] {
+                let half = (1.0 - y * y).sqrt();
+                let list = intervals(
+                    &body,
+                    DVec3::new(-2.0, y, 1.0),
+                    DVec3::X * 0.01,
+                    [-1.0, 400.0],
+                );
+                for i in 0..=1000 {
+                    let x = -half + 2.0 * half * f64::from(i) / 1000.0;
+                    assert!(holds(&list, (x + 2.0) / 0.01, 1e-9), "{x} at {y}");
+                }
+                assert!(list.len() < 400, "{}", list.len());
+            }
+            // Along a line of the side, and touching it across.
+            let list = intervals(
+                &body,
+                DVec3::new(0.6, 0.8, -1.0),
+                DVec3::Z * 0.01,
+                [-1.0, 400.0],
+            );
+            for i in 0..=100 {
+                assert!(holds(&list, 100.0 + f64::from(i), 1e-9), "{i} of {list:?}");
+            }
+            let list = intervals(
+                &body,
+                DVec3::new(-2.0, 1.0, 0.5),
+                DVec3::X * 0.1,
+                [-1.0, 99.0],
+            );
+            assert!(holds(&list, 20.0, 1e-9), "{list:?}");
+            assert!(list.iter().all(|[a, b]| *a > 19.9 && *b < 20.1), "{list:?}");
+        }
+        let ball = faces(&ball(1.0, &biquadratic()));
+        for along in [DVec3::X, DVec3::new(0.6, -0.8, 0.0)] {
+            let list = intervals(&ball, DVec3::Z - along * 2.0, along * 0.1, [-1.0, 99.0]);
+            assert!(holds(&list, 20.0, 1e-9), "{list:?}");
+            assert!(
+                list.iter().all(|[a, b]| *a > 19.9 && *b < 20.1) && list.len() < 200,
+                "{list:?}"
+            );
+        }
+        let ring = faces(&torus(1.0, 0.4, TAU));
+        // The plane that touches a torus along a circle.
+        let list = intervals(
+            &ring,
+            DVec3::new(-2.0, 0.0, 0.4),
+            DVec3::X * 0.1,
+            [-1.0, 99.0],
+        );
+        assert!(
+            holds(&list, 10.0, 1e-9) && holds(&list, 30.0, 1e-9),
+            "{list:?}"
+        );
+        // A line along the edge of a block.
+        let block = faces(&block([0.0; 3], [1.0; 3]));
+        let list = intervals(
+            &block,
+            DVec3::new(-1.0, 0.0, 0.0),
+            DVec3::X * 0.01,
+            [-1.0, 400.0],
+        );
+        for i in 100..=200 {
+            assert!(holds(&list, f64::from(i), 1e-12), "{i} of {list:?}");
+        }
+    }
+
+    #[test]
+    fn bent_blocks_change_sides_only_at_crossings() {
+        // Between crossings the distance has no zero: its sign along the row is that of the number of
+        // changes, and each change of a plane's side is held.
+        let mut numbers = Numbers(13);
+        for _ in 0..4 {
+            let by: Vec<f64> = (0..108)
+                .map(|_| numbers.next().expect("endless") * 0.4 - 0.2)
+                .collect();
+            let body = faces(&bent(&by));
+            for _ in 0..40 {
+                let start = numbers.point(-0.5, 2.5);
+                let along = numbers.point(-0.05, 0.05);
+                let list = intervals(&body, start, along, [-1.0, 100.0]);
+                let mut s = -1.0;
+                while s < 100.0 {
+                    let d = body.distance(start + along * s, f64::INFINITY);
+                    assert!(
+                        d > 1e-9 || holds(&list, s, 1e-6),
+                        "{s} is at {d:e}, {list:?}"
+                    );
+                    // Sphere tracing: no face is met before the next step.
+                    s += (d / along.length()).max(1e-9);
+                    if d <= 1e-9 {
+                        let past = list.iter().filter(|i| i[0] - 1e-6 <= s && s <= i[1] + 1e-6);
+                        s = past.fold(s, |s, i| s.max(i[1] + 1e-6)) + 1e-6;
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scales_offsets_and_senseless_lines() {
+        for (scale, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
+            let place = |p: [f64; 3]| p.map(|x| x * scale + offset);
+            let body = faces(&mapped(&ball(1.0, &biquadratic()), place));
+            let start = DVec3::from_array(place([-2.0, 0.1, 0.3]));
+            let along = DVec3::X * (0.01 * scale);
+            let list = intervals(&body, start, along, [-1.0, 400.0]);
+            let half = (1.0 - 0.01 - 0.09_f64).sqrt();
+            for x in [-half, half] {
+                assert!(
+                    holds(&list, (x + 2.0) / 0.01, 1e-6),
+                    "{scale} {offset} {list:?}"
+                );
+            }
+            assert!(list.len() < 8);
+        }
+        let body = faces(&ball(1.0, &biquadratic()));
+        for (start, along) in [
+            (DVec3::ZERO, DVec3::ZERO),
+            (DVec3::NAN, DVec3::X),
+            (DVec3::ZERO, DVec3::INFINITY),
+        ] {
+            let mut list = Vec::new();
+            body.line(start, along, [-1.0, 9.0], 0.0, &mut |a, b| {
+                list.push([a, b])
+            });
+            assert_eq!(list, [[-1.0, 9.0]]);
+        }
+    }
 }
