@@ -7,15 +7,17 @@ use super::output::{self, Console, NOTHING_LEFT};
 use crate::error::Error;
 use crate::grid::GridSpec;
 use crate::io::available_bytes;
-use crate::io::exr::{Compression, LayerChannels, SampleKind};
+use crate::io::exr::{Compression, LayerChannels, SampleKind, Samples};
 use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
 };
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{Certainty, Channel, LayerBuffers, LayerSampler, Selection, Tally};
-use crate::scene::{ChannelName, CompressionName, FormatName, Scene, nearest};
-use crate::solid::{Operation, Part};
+use crate::scene::{
+    ChannelModel, ChannelName, CompressionName, FormatName, PARAMETERS, Scene, nearest,
+};
+use crate::solid::{Operation, Part, Scalar};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -29,6 +31,7 @@ const COPIES: u64 = 4;
 struct Plan {
     grid: GridSpec,
     selection: Selection,
+    scalars: Vec<Scalar>,
     channels: Vec<ChannelSpec>,
     compression: Compression,
     workers: usize,
@@ -129,15 +132,9 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         }
         Ok(chosen)
     }
+    let channels = channels(scene, &arguments.channels)?;
     let (grid, output) = scene.model_mut();
     arguments.step.apply(grid)?;
-    let channels = names(
-        &arguments.channels,
-        "--channels",
-        ChannelName::ALL,
-        ChannelName::name,
-        ChannelName::from_name,
-    )?;
     if !channels.is_empty() {
         output.channels = channels;
     }
@@ -173,6 +170,22 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The channels that `--channels` names.
+fn channels(scene: &Scene, given: &[String]) -> Result<Vec<ChannelModel>, Failure> {
+    let names: Vec<&str> = given.iter().map(String::as_str).collect();
+    scene.model().channels(&names).map_err(|(index, problem)| {
+        let text = names[index];
+        let what = match problem.wanted.as_str() {
+            "each name once" => "is given twice".to_owned(),
+            wanted => format!("is not {wanted}"),
+        };
+        let hint = problem
+            .hint
+            .map_or_else(String::new, |n| format!("; did you mean {n}?"));
+        Failure::usage(format!("--channels: {text:?} {what}{hint}"))
+    })
+}
+
 fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
     let grid = scene.grid()?;
     let output = &scene.model().output;
@@ -180,9 +193,10 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
     let channels: Vec<ChannelSpec> = output
         .channels
         .iter()
-        .map(|&c| ChannelSpec::named(c.name(), kind(c), units))
+        .map(|c| ChannelSpec::named(c.name(), kind(c), units))
         .collect();
-    let wanted: Vec<Channel> = output.channels.iter().map(|&c| channel(c)).collect();
+    let wanted: Vec<Channel> = output.channels.iter().filter_map(channel).collect();
+    let scalars: Vec<Scalar> = output.channels.iter().filter_map(scalar).collect();
     let selection = Selection::of(&wanted, scene.band(&grid));
     if selection.sdf {
         check_f32_range(scene, &grid)?;
@@ -197,7 +211,10 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
         CompressionName::Pxr24 => Compression::Pxr24,
     };
     let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
-    let layer_bytes = LayerSampler::bytes_per_layer(&grid, &selection).saturating_mul(COPIES);
+    let scalar_bytes = 4 * (grid.layer_len() as u64).saturating_mul(scalars.len() as u64);
+    let layer_bytes = LayerSampler::bytes_per_layer(&grid, &selection)
+        .saturating_add(scalar_bytes)
+        .saturating_mul(COPIES);
     let limit = arguments.memory_limit.unwrap_or_else(default_memory_limit);
     if layer_bytes > limit {
         let [nx, ny, _] = grid.dims();
@@ -221,6 +238,7 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
     Ok(Plan {
         grid,
         selection,
+        scalars,
         channels,
         compression,
         workers,
@@ -229,20 +247,29 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
     })
 }
 
-fn channel(name: ChannelName) -> Channel {
-    match name {
-        ChannelName::Occupancy => Channel::Occupancy,
-        ChannelName::Fraction => Channel::Fraction,
-        ChannelName::Sdf => Channel::Sdf,
-        ChannelName::Material => Channel::Material,
+fn channel(model: &ChannelModel) -> Option<Channel> {
+    match model {
+        ChannelModel::Known(ChannelName::Occupancy) => Some(Channel::Occupancy),
+        ChannelModel::Known(ChannelName::Fraction) => Some(Channel::Fraction),
+        ChannelModel::Known(ChannelName::Sdf) => Some(Channel::Sdf),
+        ChannelModel::Known(ChannelName::Material) => Some(Channel::Material),
+        ChannelModel::Scalar(_) => None,
     }
 }
 
-fn kind(name: ChannelName) -> SampleKind {
-    match name {
-        ChannelName::Occupancy => SampleKind::Half,
-        ChannelName::Fraction | ChannelName::Sdf => SampleKind::Float,
-        ChannelName::Material => SampleKind::Uint,
+fn scalar(model: &ChannelModel) -> Option<Scalar> {
+    let ChannelModel::Scalar(name) = model else {
+        return None;
+    };
+    let parameter = PARAMETERS.iter().position(|p| p == name);
+    Some(parameter.map_or_else(|| Scalar::Field(name.clone()), Scalar::Parameter))
+}
+
+fn kind(model: &ChannelModel) -> SampleKind {
+    match model {
+        ChannelModel::Known(ChannelName::Occupancy) => SampleKind::Half,
+        ChannelModel::Known(ChannelName::Material) => SampleKind::Uint,
+        _ => SampleKind::Float,
     }
 }
 
@@ -322,7 +349,9 @@ fn stream(
 ) -> Result<(f64, f64, Tally), Failure> {
     let interrupted = || interrupt::check().is_err();
     let sampler =
-        LayerSampler::new(scene.assembly(), &plan.grid, plan.selection).with_cancel(&interrupted);
+        LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
+            .with_scalars(plan.scalars.clone())
+            .with_cancel(&interrupted);
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
@@ -344,7 +373,11 @@ fn stream(
             sdf: plan.selection.sdf.then_some(&buffers.sdf),
             material: plan.selection.material.then_some(&buffers.material),
         };
-        writer.write_layer(k, &layer)?;
+        let mut samples = layer.list();
+        let names = plan.channels.iter().filter(|c| ChannelName::from_name(&c.name).is_none());
+        let scalars = names.zip(&buffers.scalars);
+        samples.extend(scalars.map(|(c, values)| (c.name.as_str(), Samples::Float(values))));
+        writer.write_samples(k, &samples)?;
         tally
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner)

@@ -58,7 +58,8 @@ impl ChannelSpec {
             "fraction" => "part of the voxel's volume that is inside the solid",
             "sdf" => "distance from the voxel centre to the surface, negative inside",
             "material" => "id of the material at the voxel centre, 0 where empty",
-            _ => "values given by the caller",
+            "u" | "v" | "w" => "parameter of the volume at the voxel centre, 0 outside",
+            _ => "values at the voxel centre, 0 outside where they are fields of volumes",
         };
         Self {
             name: name.into(),

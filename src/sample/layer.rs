@@ -4,7 +4,7 @@ use super::fraction::FractionSampler;
 use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
 use crate::math::Side;
-use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Row, signed};
+use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Row, Scalar, signed};
 use std::sync::Arc;
 
 /// A quantity sampled on a grid.
@@ -58,6 +58,8 @@ pub struct LayerBuffers {
     pub sdf: Vec<f32>,
     /// Material id.
     pub material: Vec<u32>,
+    /// Scalars of volumes, one list for each that the sampler was given.
+    pub scalars: Vec<Vec<f32>>,
     /// Voxels whose centre is inside.
     pub inside: u64,
     /// Sum of the fractions before they were rounded to f32.
@@ -80,6 +82,7 @@ pub struct LayerSampler<'a> {
     surfaces: Vec<Arc<Body>>,
     /// Surface and material of the added parts, the last first; empty where there is one material.
     layered: Vec<(usize, u32)>,
+    scalars: Vec<Scalar>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -137,7 +140,14 @@ impl<'a> LayerSampler<'a> {
             fractions,
             surfaces,
             layered,
+            scalars: Vec::new(),
         }
+    }
+
+    /// A sampler that fills [`LayerBuffers::scalars`] with these, too.
+    #[must_use]
+    pub fn with_scalars(self, scalars: Vec<Scalar>) -> Self {
+        Self { scalars, ..self }
     }
 
     /// A sampler that leaves a layer unfinished once `cancel` says so.
@@ -174,6 +184,11 @@ impl<'a> LayerSampler<'a> {
         out.material.clear();
         out.material
             .resize(if self.selection.material { n } else { 0 }, 0);
+        out.scalars.resize(self.scalars.len(), Vec::new());
+        for values in &mut out.scalars {
+            values.clear();
+            values.resize(n, 0.0);
+        }
         out.inside = 0;
         out.fraction_sum = 0.0;
         out.tally = Tally::default();
@@ -200,6 +215,9 @@ impl<'a> LayerSampler<'a> {
                 let material = &mut out.material[range.clone()];
                 self.material_row(j, k, &scratch.sides, occupancy, material);
                 out.tally.count_materials(material);
+            }
+            if !self.scalars.is_empty() {
+                self.scalar_row([j, k], occupancy, &mut out.scalars);
             }
             if self.selection.sdf {
                 let sdf = &mut out.sdf[range.clone()];
@@ -272,6 +290,27 @@ impl<'a> LayerSampler<'a> {
                     |&(_, m)| m,
                 )
             };
+        }
+    }
+
+    fn scalar_row(&self, [j, k]: [usize; 2], occupancy: &[u8], out: &mut [Vec<f32>]) {
+        let first = j * occupancy.len();
+        for (i, _) in occupancy.iter().enumerate().filter(|(_, o)| **o != 0) {
+            let point = self.grid.centre(i, j, k);
+            let Some((volume, from)) = self.assembly.preimage(point) else {
+                continue;
+            };
+            for (scalar, values) in self.scalars.iter().zip(out.iter_mut()) {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    reason = "stored voxels are f32; parameters and fields are below 1e100"
+                )]
+                {
+                    values[first + i] = (volume.scalar(scalar, &from))
+                        .clamp(f64::from(f32::MIN), f64::from(f32::MAX))
+                        as f32;
+                }
+            }
         }
     }
 

@@ -50,7 +50,7 @@ pub use limits::{
     MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
-    AxisModel, Boundary, ChannelName, CompressionName, CurveForm, CurveKind, CurveModel, FieldModel,
+    AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, PARAMETERS, CompressionName, CurveForm, CurveKind, CurveModel, FieldModel,
     Fill, FormatName, PatchModel, SectionModel, VolumeModel, VolumeSource,
     GridModel, GridStep, Operation, OutputModel, PlaceStep, PointModel, ProfileModel, SceneModel,
     SolidKind, SolidModel, TurnModel, Units,

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::error::{Place, SceneError, Sources};
+use super::keys::nearest;
 use crate::solid::Shape;
 
 /// An enum whose variants have names in scene files.
@@ -69,6 +70,38 @@ named! {
         Material = "material",
     }
 }
+
+/// A channel of the output.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ChannelModel {
+    /// What every scene has.
+    Known(ChannelName),
+    /// A parameter or a field of the volumes, by name.
+    Scalar(String),
+}
+
+impl ChannelModel {
+    /// The channel's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Known(known) => known.name(),
+            Self::Scalar(name) => name,
+        }
+    }
+}
+
+/// What is wrong with the name of a channel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelProblem {
+    /// What is wanted instead.
+    pub wanted: String,
+    /// The nearest name.
+    pub hint: Option<String>,
+}
+
+/// The parameters of volumes, as channels are called.
+pub const PARAMETERS: [&str; 3] = ["u", "v", "w"];
 
 named! {
     /// A file format of the samples.
@@ -155,6 +188,65 @@ pub struct SceneModel {
 }
 
 impl SceneModel {
+    /// The names of the channels that the scene's volumes add: their parameters, where there are
+    /// volumes, and their fields.
+    #[must_use]
+    pub fn scalar_names(&self) -> Vec<&str> {
+        let volumes = self.solids.iter().filter_map(|s| match &s.kind {
+            SolidKind::Volume(volume) => Some(&volume.source),
+            _ => None,
+        });
+        let mut names: Vec<&str> = Vec::new();
+        for source in volumes {
+            let fields = match source {
+                VolumeSource::Patches(patches) => patches[0].fields.as_slice(),
+                _ => &[],
+            };
+            let fields = fields.iter().map(|f| f.name.as_str());
+            for name in PARAMETERS.into_iter().chain(fields) {
+                if !names.contains(&name) {
+                    names.push(name);
+                }
+            }
+        }
+        names
+    }
+
+    /// The channels of those names.
+    ///
+    /// # Errors
+    /// The index of the first name that the scene has no channel of, or that is there twice.
+    pub fn channels(&self, names: &[&str]) -> Result<Vec<ChannelModel>, (usize, ChannelProblem)> {
+        let scalars = self.scalar_names();
+        let mut found: Vec<ChannelModel> = Vec::new();
+        for (index, &name) in names.iter().enumerate() {
+            let channel = match ChannelName::from_name(name) {
+                Some(known) => ChannelModel::Known(known),
+                None if scalars.contains(&name) => ChannelModel::Scalar(name.to_owned()),
+                None => {
+                    let known = ChannelName::ALL.iter().map(|c| c.name());
+                    let all: Vec<&str> = known.chain(scalars.iter().copied()).collect();
+                    return Err((
+                        index,
+                        ChannelProblem {
+                            wanted: format!("one of {}", all.join(", ")),
+                            hint: nearest(name, all.iter().copied()).map(str::to_owned),
+                        },
+                    ));
+                }
+            };
+            if found.contains(&channel) {
+                let problem = ChannelProblem {
+                    wanted: "each name once".to_owned(),
+                    hint: None,
+                };
+                return Err((index, problem));
+            }
+            found.push(channel);
+        }
+        Ok(found)
+    }
+
     /// An error about the value at `place`; see [`Sources::error`].
     pub fn error(
         &self,
@@ -209,7 +301,7 @@ pub enum GridStep {
 #[non_exhaustive]
 pub struct OutputModel {
     /// What is sampled, each once.
-    pub channels: Vec<ChannelName>,
+    pub channels: Vec<ChannelModel>,
     /// Files, each once.
     pub formats: Vec<FormatName>,
     /// Compression of the files.

@@ -15,7 +15,7 @@ use crate::math::bernstein;
 use crate::math::{Dd, Real};
 use crate::nurbs::{KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError};
 use crate::region::{Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, beziers};
-use crate::solid::{Body, Part, Patches, Turn};
+use crate::solid::{Body, Field, Part, Patches, Turn};
 use std::sync::Arc;
 
 /// The part that a volume is.
@@ -48,12 +48,29 @@ pub(super) fn part(
     for (index, volume) in volumes.iter().enumerate() {
         maker.check(index, volume)?;
     }
-    let body = Patches::new(&frame, volumes).map_err(|e| maker.refused(&e.to_string()))?;
+    let fields = match &volume.source {
+        VolumeSource::Patches(patches) => fields(patches, &volumes),
+        _ => Ok(Vec::new()),
+    };
+    let body = fields.and_then(|fields| Patches::new(&frame, volumes, fields));
+    let body = body.map_err(|e| maker.refused(&e.to_string()))?;
     Ok(Part::new(
         solid.name.clone(),
         solid.material,
         Body::Patches(body),
     ))
+}
+
+/// The fields of patches, all of which have the same.
+fn fields(patches: &[PatchModel], volumes: &[NurbsVolume]) -> Result<Vec<Field>, NurbsError> {
+    let names = patches[0].fields.iter().enumerate();
+    let made = names.map(|(index, field)| {
+        let values: Vec<&[f64]> = (patches.iter())
+            .map(|p| p.fields[index].values.as_slice())
+            .collect();
+        Field::new(field.name.clone(), volumes, &values)
+    });
+    made.collect()
 }
 
 /// A part of a chain with z monotone: a rational Bézier piece.

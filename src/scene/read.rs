@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use super::error::{At, Fault, Place, Sources, push_key};
 use super::fields::{
-    Fields, choice, choice_list, choices, entries, find, integer, length, missing, name, name_text,
-    number, tuple, vector,
+    Fields, choice, choice_list, choices, each, elements, entries, find, integer, length, missing,
+    name, name_text, number, string, tuple, vector,
 };
 use super::keys;
 use super::limits::MAX_VOXELS;
 use super::model::{
-    ChannelName, CompressionName, FormatName, GridModel, GridStep, OutputModel, SceneModel, Units,
+    ChannelModel, ChannelName, CompressionName, FormatName, GridModel, GridStep, OutputModel,
+    PARAMETERS, SceneModel, Units,
 };
 use super::points::PointFiles;
 use super::profile::profile;
@@ -55,9 +56,9 @@ pub(super) fn scene(
             place: root.place,
         },
     };
-    let output = match fields.read("output", output)? {
-        Some(output) => output,
-        None => default_output(root.place),
+    let (output, channels) = match fields.read("output", output)? {
+        Some(found) => found,
+        None => (default_output(root.place), None),
     };
     let materials = fields.read("materials", materials)?.unwrap_or_default();
     let profiles = fields
@@ -84,7 +85,7 @@ pub(super) fn scene(
         solids(value, &mut context)
     })?;
     let reference = fields.read("reference", reference)?;
-    Ok(SceneModel {
+    let mut model = SceneModel {
         name,
         units,
         grid,
@@ -94,7 +95,32 @@ pub(super) fn scene(
         solids,
         reference,
         sources: Sources::default(),
+    };
+    model.output.channels = match channels {
+        Some(names) => chosen(&model, &names).at_key("channels").at_key("output")?,
+        None => with_fields(&model),
+    };
+    Ok(model)
+}
+
+/// The channels that a scene names.
+fn chosen(model: &SceneModel, names: &[(String, Place)]) -> Result<Vec<ChannelModel>, Fault> {
+    let plain: Vec<&str> = names.iter().map(|(name, _)| name.as_str()).collect();
+    model.channels(&plain).map_err(|(index, problem)| {
+        let hint = problem.hint.map(|near| format!("did you mean `{near}`?"));
+        Fault::value(names[index].1, problem.wanted)
+            .with_hint(hint)
+            .at_index(index)
     })
+}
+
+/// The usual channels and all fields.
+fn with_fields(model: &SceneModel) -> Vec<ChannelModel> {
+    let known = model.output.channels.clone();
+    let scalars = model.scalar_names();
+    let fields = scalars.iter().filter(|name| !PARAMETERS.contains(name));
+    let fields = fields.map(|name| ChannelModel::Scalar((*name).to_owned()));
+    known.into_iter().chain(fields).collect()
 }
 
 /// Voxels along the longest side where nothing says otherwise.
@@ -185,9 +211,9 @@ fn grid(value: &Value) -> Result<GridModel, Fault> {
 fn default_output(place: Place) -> OutputModel {
     OutputModel {
         channels: vec![
-            ChannelName::Occupancy,
-            ChannelName::Fraction,
-            ChannelName::Sdf,
+            ChannelModel::Known(ChannelName::Occupancy),
+            ChannelModel::Known(ChannelName::Fraction),
+            ChannelModel::Known(ChannelName::Sdf),
         ],
         formats: vec![FormatName::Exr],
         compression: CompressionName::Auto,
@@ -196,14 +222,23 @@ fn default_output(place: Place) -> OutputModel {
     }
 }
 
-fn output(value: &Value) -> Result<OutputModel, Fault> {
+/// Names with their places.
+type Names = Vec<(String, Place)>;
+
+/// The output, and the names of its channels where it has them.
+fn output(value: &Value) -> Result<(OutputModel, Option<Names>), Fault> {
     let fields = Fields::new(value, keys::OUTPUT, "a table")?;
     let mut output = default_output(value.place);
-    if let Some(channels) = fields.read("channels", |value| {
-        choice_list(value, choices!(ChannelName))
-    })? {
-        output.channels = channels;
-    }
+    let channels = fields.read("channels", |value| {
+        let wanted = "an array of names of channels";
+        let list = elements(value, wanted)?;
+        if list.is_empty() {
+            return Err(Fault::value(value.place, wanted));
+        }
+        each(list, |_, value| {
+            Ok((string(value, "the name of a channel")?.to_owned(), value.place))
+        })
+    })?;
     if let Some(formats) =
         fields.read("formats", |value| choice_list(value, choices!(FormatName)))?
     {
@@ -217,7 +252,7 @@ fn output(value: &Value) -> Result<OutputModel, Fault> {
     output.band = fields.read("band", |value| {
         number(value, "a number of voxels greater than 0", |x| x > 0.0)
     })?;
-    Ok(output)
+    Ok((output, channels))
 }
 
 fn materials(value: &Value) -> Result<BTreeMap<u32, String>, Fault> {

@@ -225,6 +225,16 @@ fn grid() -> Value {
     )
 }
 
+/// A channel that every scene has, or the name of a parameter or field of a volume.
+fn channel() -> Value {
+    let mut known = names("A channel.", ChannelName::ALL.iter().map(|n| n.name()));
+    known["description"] = json!("A channel of every scene.");
+    choice(
+        "A channel.",
+        json!([known, name("A parameter u, v, w or a field of the scene's volumes.")]),
+    )
+}
+
 fn output() -> Value {
     let several = |description: &str, item: Value| {
         let mut list = array(description, 1, item);
@@ -240,7 +250,7 @@ fn output() -> Value {
                 with_default(
                     several(
                         "What is sampled.",
-                        names("A channel.", ChannelName::ALL.iter().map(|n| n.name())),
+                        channel(),
                     ),
                     json!(["occupancy", "fraction", "sdf"]),
                 ),

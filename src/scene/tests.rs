@@ -138,9 +138,9 @@ fn the_smallest_scene_gets_every_default() {
     assert_eq!(
         scene.output.channels,
         [
-            ChannelName::Occupancy,
-            ChannelName::Fraction,
-            ChannelName::Sdf
+            ChannelModel::Known(ChannelName::Occupancy),
+            ChannelModel::Known(ChannelName::Fraction),
+            ChannelModel::Known(ChannelName::Sdf)
         ]
     );
     assert_eq!(scene.output.compression, CompressionName::Auto);

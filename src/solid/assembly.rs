@@ -11,9 +11,11 @@
 
 use super::body::Body;
 use super::part::{Operation, Part};
+use super::patches::Patches;
 use super::terms::{Factor, Term, terms};
 use crate::math::Aabb;
 use crate::math::Side;
+use crate::patch::Preimage;
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -245,6 +247,16 @@ impl Assembly {
             added().min_by(|a, b| distance(a).total_cmp(&distance(b)))
         };
         holding.or_else(nearest).map_or(0, Part::material)
+    }
+
+    /// The volume that gives a point of the composite its scalars, and where in it the point comes
+    /// from: the last added part that holds it, where that is one of trivariate NURBS.
+    pub(crate) fn preimage(&self, point: DVec3) -> Option<(&Patches, Preimage)> {
+        let part = self.added().rev().find(|p| p.contains(point))?;
+        let Body::Patches(volume) = &**part.body() else {
+            return None;
+        };
+        Some((volume, volume.invert(point)?))
     }
 
     /// The part of the composite that has a material: what the parts of other materials cover later

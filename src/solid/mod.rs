@@ -35,7 +35,7 @@ pub use body::Body;
 pub use ellipsoid::Ellipsoid;
 pub use measure::{MeasureErrors, Measures, Moments};
 pub use part::{Operation, Part};
-pub use patches::Patches;
+pub use patches::{Field, Patches, Scalar};
 pub use revolved::Revolved;
 pub use turn::Turn;
 

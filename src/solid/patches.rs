@@ -19,6 +19,47 @@ use glam::DVec3;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
+/// A number that a volume has at each of its points.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Scalar {
+    /// One of the parameters, by its place.
+    Parameter(usize),
+    /// A field, by its name.
+    Field(String),
+}
+
+/// A scalar over the basis of a volume's net: values at the control points, combined as these are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    name: String,
+    /// For each volume the same net, its first coordinate the value.
+    nets: Vec<NurbsVolume>,
+}
+
+impl Field {
+    /// The field with a list of values for each volume, one for each control point.
+    ///
+    /// # Errors
+    /// [`NurbsError::Length`] where the counts do not agree.
+    pub fn new(
+        name: String,
+        volumes: &[NurbsVolume],
+        values: &[&[f64]],
+    ) -> Result<Self, NurbsError> {
+        let nets = volumes.iter().zip(values).map(|(volume, values)| {
+            NurbsVolume::new(
+                volume.knots().clone(),
+                values.iter().map(|&v| [v, 0.0, 0.0]).collect(),
+                volume.weights().to_vec(),
+            )
+        });
+        Ok(Self {
+            name,
+            nets: nets.collect::<Result<_, _>>()?,
+        })
+    }
+}
+
 /// Nets with all that is known of them; shared by the places they are put in.
 #[derive(Debug)]
 pub(crate) struct Nets {
@@ -29,6 +70,7 @@ pub(crate) struct Nets {
     /// The point that the moments are about, and the area of the outer faces.
     about: [f64; 3],
     area: Integral,
+    fields: Vec<Field>,
 }
 
 /// The image of one or several trivariate NURBS.
@@ -46,7 +88,11 @@ impl Patches {
     ///
     /// # Errors
     /// [`NurbsError`] when control points lie too far apart for their differences to be finite.
-    pub fn new(frame: &Similarity, volumes: Vec<NurbsVolume>) -> Result<Self, NurbsError> {
+    pub fn new(
+        frame: &Similarity,
+        volumes: Vec<NurbsVolume>,
+        fields: Vec<Field>,
+    ) -> Result<Self, NurbsError> {
         let cells = Cells::new(&volumes)?;
         let faces = FaceSet::new(&volumes)?;
         let around = faces.bounds();
@@ -72,6 +118,7 @@ impl Patches {
                 moments,
                 about,
                 area,
+                fields,
             }),
         ))
     }
@@ -119,6 +166,20 @@ impl Patches {
     #[must_use]
     pub fn invert(&self, point: DVec3) -> Option<Preimage> {
         self.nets.cells.invert(self.frame.to_local(point).point)
+    }
+
+    /// The scalar at a point of the solid; 0 for a field that it does not have.
+    #[must_use]
+    pub fn scalar(&self, scalar: &Scalar, at: &Preimage) -> f64 {
+        match scalar {
+            Scalar::Parameter(k) => at.parameters[*k],
+            Scalar::Field(name) => {
+                let field = self.nets.fields.iter().find(|f| f.name == *name);
+                let net = field.and_then(|f| f.nets.get(at.volume));
+                let value = net.and_then(|n| n.evaluate(at.parameters).ok());
+                value.map_or(0.0, |[value, ..]| value)
+            }
+        }
     }
 
     pub(super) fn side(&self, point: DVec3) -> Side {
