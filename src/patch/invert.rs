@@ -235,20 +235,22 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         let q = inverse.map(|r| dot(r, d));
         // Rounding of the difference and of the product; coordinates are at most 1 here.
         let off = self.error + 16.0 * U;
-        let [low, high] = regular.hull;
-        if (0..3).any(|k| q[k] < low[k] - rows[k] * off || q[k] > high[k] + rows[k] * off) {
+        let [least, most] = regular.hull;
+        if (0..3).any(|k| q[k] < least[k] - rows[k] * off || q[k] > most[k] + rows[k] * off) {
             return;
         }
         let noise = cell.noise + self.error;
-        let limits = limits(cell, window, &regular.certificate, false);
+        let limits = limits(cell, window, &regular.certificate, false, !self.one);
         let start = q.map(|q| 0.5 + q * regular.weight);
+        // Leaves are wide enough for f64.
+        let low = window.low.map(Real::f64);
         let located = locate(&limits, start, |x: [f64; 3]| {
-            let t: [f64; 3] = std::array::from_fn(|k| window.low[k] + window.width[k] * x[k]);
+            let t: [f64; 3] = std::array::from_fn(|k| low[k] + window.width[k] * x[k]);
             let h = net::value_and_slopes(&cell.net, cell.counts, t);
             let f: [[f64; 3]; 4] =
                 std::array::from_fn(|i| std::array::from_fn(|c| h[i][c] - p[c] * h[i][3]));
             Sample {
-                x: std::array::from_fn(|k| (t[k] - window.low[k]) / window.width[k]),
+                x: std::array::from_fn(|k| (t[k] - low[k]) / window.width[k]),
                 value: inverse.map(|r| dot(r, f[0])),
                 error: std::array::from_fn(|k| {
                     let size = (0..3).map(|c| (inverse[k][c] * f[0][c]).abs()).sum::<f64>();
@@ -281,10 +283,10 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         let p = self.exactly();
         let cells = self.cells;
         let cell = &cells.cells[index];
-        let limits = limits(cell, window, by, true);
+        let limits = limits(cell, window, by, true, !self.one);
         let located = locate(&limits, start.map(Dd::of), |x: [Dd; 3]| {
             let t: [Dd; 3] = std::array::from_fn(|k| {
-                Dd::of(window.low[k]) + x[k].scale_by_power_of_two(window.width[k])
+                window.low[k] + x[k].scale_by_power_of_two(window.width[k])
             });
             let h = net::value_and_slopes(&cell.exact, cell.counts, t);
             let f: [[f64; 3]; 4] = std::array::from_fn(|i| {
@@ -353,8 +355,9 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         let counts = problem.cell.counts;
         let mut whole: SmallVec<[Row<T, 4>; 64]> = SmallVec::from_slice(problem.net);
         for k in 0..3 {
-            let (a, b) = (window.low[k], window.low[k] + window.width[k]);
-            net::restrict(&mut whole, counts, k, T::of(a), T::of(b));
+            // The window of a leaf.
+            let a = window.low[k].f64();
+            net::restrict(&mut whole, counts, k, T::of(a), T::of(a + window.width[k]));
         }
         let mut boxes = 0;
         let mut stack: SmallVec<[Open<T>; 4]> = SmallVec::new();
@@ -506,7 +509,7 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         let round = gamma((4 * degrees + 8) as f64);
         let error: [f64; 3] =
             std::array::from_fn(|c| stretch * (error[c] + round * size[c]));
-        let limits = limits(cell, window, by, false);
+        let limits = limits(cell, window, by, false, !self.one);
         let located = locate(&limits, [0.5; 3], |x: [f64; 3]| {
             let h = net::value_and_slopes(local, counts, x);
             let part = |i: usize| [h[i][0], h[i][1], h[i][2]];
@@ -541,12 +544,18 @@ impl Found {
 }
 
 fn parameters(window: Window, x: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| window.low[k] + window.width[k] * x[k])
+    std::array::from_fn(|k| (window.low[k] + Dd::product(window.width[k], x[k])).f64())
 }
 
 /// The tolerances at the sides of a window, in its local coordinates.
 #[inline]
-fn limits(cell: &Cell, window: Window, by: &Certificate, exact: bool) -> Limits {
+fn limits(
+    cell: &Cell,
+    window: Window,
+    by: &Certificate,
+    exact: bool,
+    refine: bool,
+) -> Limits {
     // A length of 1 at the root is at most this in local coordinates, where W <= 1.
     let length = by.rows.map(|r| r / (1.0 - by.kappa));
     let on = length.map(|l| if exact { l * ON_BOUNDARY } else { 0.0 });
@@ -568,5 +577,6 @@ fn limits(cell: &Cell, window: Window, by: &Certificate, exact: bool) -> Limits 
         kappa: by.kappa,
         outside,
         on,
+        refine,
     }
 }

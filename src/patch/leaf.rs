@@ -21,6 +21,7 @@
 use super::cells::Cell;
 use super::net::{self, Counts, Row};
 use crate::math::tolerance::{U, gamma};
+use crate::math::{Dd, Real};
 use smallvec::SmallVec;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -47,7 +48,8 @@ pub(super) type LocalNet = SmallVec<[Row<f64, 4>; 64]>;
 /// A box of a cell's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Window {
-    pub(super) low: [f64; 3],
+    /// Multiples of the width. Near 1 they take more than the 53 bits of f64.
+    pub(super) low: [Dd; 3],
     /// Powers of two.
     pub(super) width: [f64; 3],
 }
@@ -88,7 +90,7 @@ pub(super) struct Regular {
 
 impl Window {
     pub(super) const CELL: Self = Self {
-        low: [0.0; 3],
+        low: [Dd::ZERO; 3],
         width: [1.0; 3],
     };
 
@@ -96,8 +98,8 @@ impl Window {
     #[inline]
     pub(super) fn at_face(&self, axis: usize) -> [bool; 2] {
         [
-            self.low[axis] == 0.0,
-            self.low[axis] + self.width[axis] == 1.0,
+            self.low[axis] == Dd::ZERO,
+            self.low[axis] + Dd::of(self.width[axis]) == Dd::ONE,
         ]
     }
 
@@ -114,7 +116,7 @@ impl Window {
         let mut half = *self;
         half.width[axis] *= 0.5;
         if side == 1 {
-            half.low[axis] += half.width[axis];
+            half.low[axis] = half.low[axis] + Dd::of(half.width[axis]);
         }
         half
     }
