@@ -329,3 +329,179 @@ fn preimages_are_preimages() {
         assert!(found > 10, "{}", solid.name);
     }
 }
+
+/// The same map with the degree of one parameter raised; Bezier nets only.
+fn elevated(v: &voxlathe::nurbs::NurbsVolume, axis: usize) -> voxlathe::nurbs::NurbsVolume {
+    let counts = v.counts();
+    let net = v.to_homogeneous();
+    let stride: usize = counts[..axis].iter().product();
+    let n = counts[axis];
+    let mut more = Vec::new();
+    for at in 0..net.len() / n * (n + 1) {
+        let (inner, i, outer) = (at % stride, at / stride % (n + 1), at / stride / (n + 1));
+        let get = |i: usize| net[inner + (i + outer * n) * stride];
+        let a = i as f64 / n as f64;
+        more.push(match i {
+            0 => get(0),
+            i if i == n => get(n - 1),
+            i => get(i - 1).mix(a, get(i), 1.0 - a),
+        });
+    }
+    let mut knots = v.knots().clone();
+    knots[axis] = voxlathe::nurbs::KnotVector::bezier(n).expect("degree");
+    voxlathe::nurbs::NurbsVolume::from_homogeneous(knots, &more).expect("valid")
+}
+
+#[test]
+fn high_degrees() {
+    let mut volume = by_disc(&line([1.0, 0.0], [1.0, 2.0]));
+    for (axis, times) in [(0, 2), (1, 5), (2, 3)] {
+        for _ in 0..times {
+            volume = elevated(&volume, axis);
+        }
+    }
+    assert_eq!(volume.degrees(), [3, 7, 5]);
+    let mut bar = by_disc(&line([1.0, 0.0], [1.0, 2.0]));
+    while bar.degrees()[0] < 32 {
+        bar = elevated(&bar, 0);
+    }
+    let tube = solids().swap_remove(0);
+    for volume in [volume, bar] {
+        let degrees = volume.degrees();
+        let cells = Cells::new(&[volume]).expect("valid");
+        let mut random = Random(2);
+        let mut spent = Vec::new();
+        for i in 0..1000 {
+            let (p, n) = (tube.surface)(&mut random);
+            let p = p + n * (random.within(-1.0, 1.0) * 10f64.powf(-16.0 * (i % 16) as f64 / 16.0));
+            let d = (tube.sdf)(p);
+            let start = std::time::Instant::now();
+            let found = side(&cells, p);
+            spent.push(start.elapsed().as_secs_f64() * 1e6);
+            // Elevation rounds the net: a few units in the last place for each step.
+            if d.abs() > 8.0 * band(2.0, p) {
+                assert_eq!(found == Side::Inside, d < 0.0, "{degrees:?} at {p}: {d:e}");
+            }
+        }
+        println!(
+            "{degrees:?}: {} leaves; us {}",
+            cells.leaves(),
+            times(spent)
+        );
+    }
+}
+
+/// Perturbed boxes of degree (2, 3, 2) with random weights: points made by evaluation are inside,
+/// points across a face go by its normal, others by the winding number of a dense tessellation.
+#[test]
+fn perturbed_volumes() {
+    use voxlathe::nurbs::{KnotVector, NurbsVolume};
+    let mut random = Random(17);
+    for round in 0..4 {
+        let knots = [(2, 4), (3, 4), (2, 3)]
+            .map(|(p, n)| KnotVector::clamped_uniform(p, n).expect("valid"));
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        for k in 0..3 {
+            for j in 0..4 {
+                for i in 0..4 {
+                    let x = [i as f64 / 3.0, j as f64 / 3.0, k as f64 / 2.0];
+                    points.push(x.map(|c| c + random.within(-0.06, 0.06)));
+                    weights.push(random.within(0.7, 1.4));
+                }
+            }
+        }
+        // Odd rounds are mirrored: the determinant is negative.
+        if round % 2 == 1 {
+            for p in &mut points {
+                p[0] = -p[0];
+            }
+        }
+        let volume = NurbsVolume::new(knots, points, weights).expect("valid");
+        let cells = Cells::new(std::slice::from_ref(&volume)).expect("valid");
+        let at = |t: [f64; 3]| DVec3::from_array(volume.evaluate(t).expect("in the domain"));
+        let mut spent = Vec::new();
+        for _ in 0..500 {
+            let t = std::array::from_fn(|_| random.within(1e-12, 1.0 - 1e-12));
+            let p = at(t);
+            assert_eq!(side(&cells, p), Side::Inside, "{t:?}");
+            let found = cells.invert(p).expect("inside").parameters;
+            assert!(
+                (0..3).all(|k| (found[k] - t[k]).abs() < 1e-12),
+                "{found:?} for {t:?}"
+            );
+        }
+        for i in 0..1500 {
+            let (axis, end) = (i % 3, f64::from(i as u32 / 3 % 2));
+            let mut t = std::array::from_fn(|_| random.within(0.01, 0.99));
+            t[axis] = end;
+            let (x, slopes) = volume.gradient(t).expect("in the domain");
+            let [a, b, c] =
+                [axis, (axis + 1) % 3, (axis + 2) % 3].map(|k| DVec3::from_array(slopes[k]));
+            let normal = b.cross(c).normalize();
+            let outward = normal * (normal.dot(a).signum() * (2.0 * end - 1.0));
+            let d = 10f64.powf(random.within(-14.0, -3.0));
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let p = DVec3::from_array(x) + outward * (sign * d);
+            if d > band(1.3, p) {
+                let start = std::time::Instant::now();
+                let found = side(&cells, p);
+                spent.push(start.elapsed().as_secs_f64() * 1e6);
+                assert_eq!(
+                    found == Side::Inside,
+                    sign < 0.0,
+                    "round {round}, {t:?}, {d:e}"
+                );
+            }
+        }
+        println!(
+            "round {round}: {} leaves; us {}",
+            cells.leaves(),
+            times(spent)
+        );
+        let n = 24;
+        let mut triangles = Vec::new();
+        for face in 0..6 {
+            let (axis, end) = (face % 3, (face / 3) as f64);
+            let corner = |i: usize, j: usize| {
+                let mut t = [end; 3];
+                t[(axis + 1) % 3] = i as f64 / n as f64;
+                t[(axis + 2) % 3] = j as f64 / n as f64;
+                at(t)
+            };
+            for i in 0..n {
+                for j in 0..n {
+                    let q = [
+                        corner(i, j),
+                        corner(i + 1, j),
+                        corner(i + 1, j + 1),
+                        corner(i, j + 1),
+                    ];
+                    for t in [[q[0], q[1], q[2]], [q[0], q[2], q[3]]] {
+                        triangles.push(if end == 1.0 { t } else { [t[0], t[2], t[1]] });
+                    }
+                }
+            }
+        }
+        let mut checked = 0;
+        for _ in 0..150 {
+            let mut p = DVec3::from_array(std::array::from_fn(|_| random.within(-0.3, 1.3)));
+            if round % 2 == 1 {
+                p.x = -p.x;
+            }
+            let mut winding = 0.0;
+            let mut nearest = f64::INFINITY;
+            for t in &triangles {
+                let [a, b, c] = t.map(|v| v - p);
+                nearest = nearest.min(a.length());
+                let (la, lb, lc) = (a.length(), b.length(), c.length());
+                let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+                winding += a.dot(b.cross(c)).atan2(below) / std::f64::consts::TAU;
+            }
+            if nearest > 0.05 {
+                checked += 1;
+                assert_eq!(side(&cells, p) == Side::Inside, winding.abs() > 0.5, "{p}");
+            }
+        }
+        assert!(checked > 60);
+    }
+}

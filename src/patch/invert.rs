@@ -36,10 +36,10 @@ use smallvec::SmallVec;
 const QUICK: usize = 1024;
 
 /// Boxes in double-double after which 2 eps is small enough.
-const SOFT: usize = 2048;
+const SOFT: usize = 256;
 
 /// Boxes in double-double after which everything is small enough.
-const HARD: usize = 16384;
+const HARD: usize = 8192;
 
 /// Where a point of the solid comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -458,15 +458,27 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
             if excluded {
                 return Answer::Closed;
             }
-            let (kappa, _) = leaf::bend(&local, counts, window.growth(), [0.0; 3], error);
-            if kappa <= leaf::MAX_KAPPA {
-                let by = Certificate {
-                    inverse,
-                    rows,
-                    kappa,
-                };
-                if self.certified(problem.index, window, &by, &local, error) {
-                    return Answer::Closed;
+            // With errors of this size nothing smaller will be decided in f64.
+            if quick && error.iter().any(|&e| e > 0.03) {
+                return Answer::Lost;
+            }
+            // The rows of DΦ sum to 1 + κ at most, and so wide is what the coefficients span.
+            let wide = (0..3).any(|c| {
+                let (low, high) = (local.iter())
+                    .fold((0.0_f64, 0.0_f64), |(l, h), b| (l.min(b[c]), h.max(b[c])));
+                high - low > 1.0 + leaf::MAX_KAPPA
+            });
+            if !wide {
+                let (kappa, _) = leaf::bend(&local, counts, window.growth(), [0.0; 3], error);
+                if kappa <= leaf::MAX_KAPPA {
+                    let by = Certificate {
+                        inverse,
+                        rows,
+                        kappa,
+                    };
+                    if self.certified(problem.index, window, &by, &local, error) {
+                        return Answer::Closed;
+                    }
                 }
             }
         }
