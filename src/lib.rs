@@ -22,6 +22,7 @@
 //!
 //! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
 //! * [`nurbs`]: knot vectors, basis functions and their cache, curves, refinement, Bézier pieces.
+//! * [`patch`]: solids that are images of NURBS volumes; membership by certified point inversion.
 //! * [`region`]: a profile's curves as bi-monotone rational pieces; membership by crossings,
 //!   certified closest points, the boundary of the filled region, its moments as line integrals.
 //! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, area, centroid and inertia,
@@ -54,6 +55,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod nurbs;
+pub mod patch;
 pub mod picture;
 pub mod region;
 pub mod sample;

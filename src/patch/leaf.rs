@@ -307,9 +307,10 @@ impl Part {
     }
 }
 
-/// The order in which parts are split: the one with the largest box first, as most points meet it.
+/// The order in which parts are split: the one whose box has the largest surface first. A box's
+/// surface is what lines and surfaces in any place meet in proportion.
 struct Turn {
-    volume: f64,
+    surface: f64,
     /// Earlier ones first among equals.
     number: Reverse<usize>,
     part: Part,
@@ -318,10 +319,10 @@ struct Turn {
 impl Turn {
     fn new(number: usize, part: Part) -> Self {
         let [low, high] = part.leaf.bounds;
-        // Boxes of flat parts have a volume too.
-        let volume = (0..3).map(|k| (high[k] - low[k]).max(1e-3)).product();
+        let d: [f64; 3] = std::array::from_fn(|k| high[k] - low[k]);
+        let surface = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
         Self {
-            volume,
+            surface,
             number: Reverse(number),
             part,
         }
@@ -330,7 +331,7 @@ impl Turn {
 
 impl Ord for Turn {
     fn cmp(&self, other: &Self) -> Ordering {
-        (self.volume.total_cmp(&other.volume)).then(self.number.cmp(&other.number))
+        (self.surface.total_cmp(&other.surface)).then(self.number.cmp(&other.number))
     }
 }
 
