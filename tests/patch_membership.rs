@@ -290,11 +290,8 @@ fn answers_do_not_depend_on_order() {
             })
             .collect();
         let there: Vec<_> = points.iter().map(|&p| side(&cells, p)).collect();
-        let mut back: Vec<_> = points
-            .iter()
-            .rev()
-            .map(|&p| side(&cells.clone(), p))
-            .collect();
+        let copy = cells.clone();
+        let mut back: Vec<_> = points.iter().rev().map(|&p| side(&copy, p)).collect();
         back.reverse();
         assert_eq!(there, back, "{}", solid.name);
     }

@@ -23,7 +23,7 @@
 //! * Cost: step 2 allocates nothing.
 
 use super::cells::{Cell, Cells};
-use super::leaf::{self, Certificate, Leaf, Regular, Window};
+use super::leaf::{self, Certificate, Hull, Leaf, Window};
 use super::net::{self, Row};
 use super::newton::{Limits, Located, Sample, dot, locate};
 use super::shared::{Face, LEAST_SLACK};
@@ -94,8 +94,7 @@ impl Found {
         // One interior face has cells on both sides; edges depend on the other cells around them.
         let whole = marked == 1
             && (0..3).any(|k| {
-                (0..2)
-                    .any(|side| faces[k][side] && matches!(cell.faces[k][side], Face::Shared(_)))
+                (0..2).any(|side| faces[k][side] && matches!(cell.faces[k][side], Face::Shared(_)))
             });
         self.inside |= whole || marked == 0;
         self.outer |= outer;
@@ -137,7 +136,10 @@ struct Open<T> {
 }
 
 /// What a box has to say.
-#[allow(clippy::large_enum_variant, reason = "it is moved to the stack of boxes at once")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "it is moved to the stack of boxes at once"
+)]
 enum Answer<T> {
     /// Nothing more.
     Closed,
@@ -176,13 +178,7 @@ impl Cells {
     }
 
     /// Asks all leaves around the point, or until one has it inside when `one` will do.
-    fn ask(
-        &self,
-        point: DVec3,
-        error: DVec3,
-        exact: impl FnOnce() -> [Dd; 3],
-        one: bool,
-    ) -> Found {
+    fn ask(&self, point: DVec3, error: DVec3, exact: impl FnOnce() -> [Dd; 3], one: bool) -> Found {
         let (local, bound) = self.to_local(point, error);
         let mut query = Query {
             cells: self,
@@ -214,31 +210,32 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
 
     #[inline]
     fn leaf(&mut self, leaf: &Leaf) {
-        match &leaf.regular {
-            Some(regular) => self.regular(leaf, regular),
-            None => self.search(leaf.cell, leaf.window),
+        let Some(hull) = &leaf.hull else {
+            self.search(leaf.cell, leaf.window);
+            return;
+        };
+        let (p, m, by) = (self.point, hull.middle, &hull.certificate);
+        let d = [p[0] - m[0], p[1] - m[1], p[2] - m[2]];
+        let q = by.inverse.map(|r| dot(r, d));
+        // Rounding of the difference and of the product; coordinates are at most 1 here.
+        let off = by.rows.map(|r| r * (self.error + 16.0 * U));
+        let [low, high] = hull.bounds;
+        if (0..3).any(|k| q[k] < low[k] - off[k] || q[k] > high[k] + off[k]) {
+            return;
+        }
+        if leaf.regular {
+            self.regular(leaf, hull, q);
+        } else {
+            self.search(leaf.cell, leaf.window);
         }
     }
 
     /// Step 2.
     #[inline]
-    fn regular(&mut self, leaf: &Leaf, regular: &Regular) {
+    fn regular(&mut self, leaf: &Leaf, regular: &Hull, q: [f64; 3]) {
         let cells = self.cells;
         let (cell, window, p) = (&cells.cells[leaf.cell], leaf.window, self.point);
-        let Certificate {
-            inverse,
-            rows,
-            ..
-        } = regular.certificate;
-        let m = regular.middle;
-        let d = [p[0] - m[0], p[1] - m[1], p[2] - m[2]];
-        let q = inverse.map(|r| dot(r, d));
-        // Rounding of the difference and of the product; coordinates are at most 1 here.
-        let off = self.error + 16.0 * U;
-        let [least, most] = regular.hull;
-        if (0..3).any(|k| q[k] < least[k] - rows[k] * off || q[k] > most[k] + rows[k] * off) {
-            return;
-        }
+        let Certificate { inverse, rows, .. } = regular.certificate;
         let noise = cell.noise + self.error;
         let limits = limits(cell, window, &regular.certificate, false, !self.one);
         let start = q.map(|q| 0.5 + q * regular.weight);
@@ -289,14 +286,15 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
                 window.low[k] + x[k].scale_by_power_of_two(window.width[k])
             });
             let h = net::value_and_slopes(&cell.exact, cell.counts, t);
-            let f: [[f64; 3]; 4] = std::array::from_fn(|i| {
-                std::array::from_fn(|c| (h[i][c] - p[c] * h[i][3]).f64())
-            });
+            let f: [[f64; 3]; 4] =
+                std::array::from_fn(|i| std::array::from_fn(|c| (h[i][c] - p[c] * h[i][3]).f64()));
             Sample {
                 x,
                 value: by.inverse.map(|r| dot(r, f[0])),
                 error: std::array::from_fn(|k| {
-                    let size = (0..3).map(|c| (by.inverse[k][c] * f[0][c]).abs()).sum::<f64>();
+                    let size = (0..3)
+                        .map(|c| (by.inverse[k][c] * f[0][c]).abs())
+                        .sum::<f64>();
                     by.rows[k] * cell.exact_noise + 8.0 * U * size
                 }),
                 slopes: std::array::from_fn(|k| {
@@ -439,13 +437,13 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         if quick && extent < 1e3 * noise {
             return Answer::Lost;
         }
-        let small = extent <= ON_BOUNDARY
-            || *boxes > SOFT && extent <= 2.0 * f64::EPSILON
-            || *boxes > HARD;
+        let small =
+            extent <= ON_BOUNDARY || *boxes > SOFT && extent <= 2.0 * f64::EPSILON || *boxes > HARD;
         if small {
             let faces = std::array::from_fn(|k| window.at_face(k));
             self.found.touch_small(cell, faces);
-            self.found.place(problem.index, parameters(window, [0.5; 3]));
+            self.found
+                .place(problem.index, parameters(window, [0.5; 3]));
             return Answer::Closed;
         }
         if let Some((inverse, rows)) = leaf::frame(&y, counts) {
@@ -464,8 +462,8 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
             }
             // The rows of DΦ sum to 1 + κ at most, and so wide is what the coefficients span.
             let wide = (0..3).any(|c| {
-                let (low, high) = (local.iter())
-                    .fold((0.0_f64, 0.0_f64), |(l, h), b| (l.min(b[c]), h.max(b[c])));
+                let (low, high) =
+                    (local.iter()).fold((0.0_f64, 0.0_f64), |(l, h), b| (l.min(b[c]), h.max(b[c])));
                 high - low > 1.0 + leaf::MAX_KAPPA
             });
             if !wide {
@@ -519,8 +517,7 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         // E reaches 1/16 outside, where the basis sums to (9/8)^p at most, in absolute values.
         let stretch = 1.125_f64.powf(degrees as f64);
         let round = gamma((4 * degrees + 8) as f64);
-        let error: [f64; 3] =
-            std::array::from_fn(|c| stretch * (error[c] + round * size[c]));
+        let error: [f64; 3] = std::array::from_fn(|c| stretch * (error[c] + round * size[c]));
         let limits = limits(cell, window, by, false, !self.one);
         let located = locate(&limits, [0.5; 3], |x: [f64; 3]| {
             let h = net::value_and_slopes(local, counts, x);
@@ -547,9 +544,8 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
 impl Found {
     /// A box of no size, or one that the bound on the work left over, meets the point.
     fn touch_small(&mut self, cell: &Cell, faces: [[bool; 2]; 3]) {
-        let outer = (0..3).any(|k| {
-            (0..2).any(|side| faces[k][side] && cell.faces[k][side] == Face::Outer)
-        });
+        let outer =
+            (0..3).any(|k| (0..2).any(|side| faces[k][side] && cell.faces[k][side] == Face::Outer));
         self.outer |= outer;
         self.shared |= !outer;
     }
@@ -561,13 +557,7 @@ fn parameters(window: Window, x: [f64; 3]) -> [f64; 3] {
 
 /// The tolerances at the sides of a window, in its local coordinates.
 #[inline]
-fn limits(
-    cell: &Cell,
-    window: Window,
-    by: &Certificate,
-    exact: bool,
-    refine: bool,
-) -> Limits {
+fn limits(cell: &Cell, window: Window, by: &Certificate, exact: bool, refine: bool) -> Limits {
     // A length of 1 at the root is at most this in local coordinates, where W <= 1.
     let length = by.rows.map(|r| r / (1.0 - by.kappa));
     let on = length.map(|l| if exact { l * ON_BOUNDARY } else { 0.0 });
