@@ -55,7 +55,7 @@ fn random_points_and_points_near_the_surface() {
             let d = 10f64.powf(random.within(-16.0, -1.0)) * solid.size;
             check(p + n * if i % 2 == 0 { d } else { -d }, &mut near);
         }
-        println!(
+        eprintln!(
             "{:22} {} cells, {:6} leaves, built in {built:.1?}; {decided} decided; us {}, near {}",
             solid.name,
             cells.len(),
@@ -208,7 +208,7 @@ fn rims_poles_and_apexes() {
                 assert_ne!(found, Side::On, "{} at {p:?}, {d:e}", solid.name);
             }
         }
-        println!("{:12} {decided} decided; us {}", solid.name, times(worst));
+        eprintln!("{:12} {decided} decided; us {}", solid.name, times(worst));
     }
     // The places themselves.
     let tube = Cells::new(&[by_disc(&line([1.0, 0.0], [1.0, 2.0]))]).expect("valid");
@@ -380,7 +380,7 @@ fn high_degrees() {
                 assert_eq!(found == Side::Inside, d < 0.0, "{degrees:?} at {p}: {d:e}");
             }
         }
-        println!(
+        eprintln!(
             "{degrees:?}: {} leaves; us {}",
             cells.leaves(),
             times(spent)
@@ -450,7 +450,7 @@ fn perturbed_volumes() {
                 );
             }
         }
-        println!(
+        eprintln!(
             "round {round}: {} leaves; us {}",
             cells.leaves(),
             times(spent)

@@ -55,7 +55,6 @@ pub(super) struct Cell {
 /// # use voxlathe::math::{Dd, Real, Side};
 /// # use voxlathe::patch::Cells;
 /// # use glam::DVec3;
-use rayon::prelude::*;
 /// // The unit cube, each coordinate a parameter.
 /// let line = || KnotVector::bezier(1);
 /// let corner = |i: usize| [i & 1, i >> 1 & 1, i >> 2].map(|b| b as f64);

@@ -76,10 +76,10 @@ pub(super) fn locate<T: Real>(
                 low
             } else if x[k] > high {
                 high
-            } else if x[k] == x[k] {
-                x[k]
-            } else {
+            } else if x[k].f64().is_nan() {
                 T::of(0.5)
+            } else {
+                x[k]
             }
         })
     };
