@@ -22,7 +22,10 @@
 //!
 //! * [`scene`]: text, TOML or JSON, to plain data with the place of every value, then to solids.
 //! * [`nurbs`]: knot vectors, basis functions and their cache, curves, refinement, Bézier pieces.
+//! * [`construct`]: exact circles, discs, spheres, and solids of revolution as trivariate NURBS.
 //! * [`exchange`]: curves, surfaces and volumes from and to the files of other programs.
+//! * [`patch`]: solids that are images of trivariate NURBS: membership by certified point inversion, the
+//!   faces that bound them.
 //! * [`region`]: a profile's curves as bi-monotone rational pieces; membership by crossings,
 //!   certified closest points, the boundary of the filled region, its moments as line integrals.
 //! * [`solid`]: regions turned about an axis, placed and joined; bounds, volume, area, centroid and inertia,

@@ -21,6 +21,7 @@ use crate::math::tolerance::{U, gamma};
 use crate::math::{Dd, Real};
 use crate::nurbs::{KnotVector, NurbsError, NurbsVolume};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A homogeneous control point (A, W).
 pub(super) type Exact = [Dd; 4];
@@ -93,10 +94,10 @@ impl Cells {
             extract(volume, v, &frame, &mut cells);
         }
         shared::classify(&mut cells, frame.tolerance);
-        let mut leaves = Vec::new();
-        for (index, cell) in cells.iter().enumerate() {
-            leaf::presplit(index, cell, cells.len(), &mut leaves);
-        }
+        // Collected in order, whatever thread a cell falls to.
+        let mut leaves: Vec<Leaf> = (cells.par_iter().enumerate())
+            .flat_map_iter(|(index, cell)| leaf::presplit(index, cell, cells.len()))
+            .collect();
         let tree = Tree::new(&mut leaves);
         Ok(Self {
             centre: frame.centre,

@@ -23,7 +23,7 @@
 //! * Cost: step 2 allocates nothing.
 
 use super::cells::{Cell, Cells};
-use super::leaf::{self, Certificate, Leaf, Regular, Window};
+use super::leaf::{self, Certificate, Hull, Leaf, Window};
 use super::net::{self, Row};
 use super::newton::{Limits, Located, Sample, dot, locate};
 use super::shared::{Face, LEAST_SLACK};
@@ -36,10 +36,10 @@ use smallvec::SmallVec;
 const QUICK: usize = 1024;
 
 /// Boxes in double-double after which 2 eps is small enough.
-const SOFT: usize = 2048;
+const SOFT: usize = 256;
 
 /// Boxes in double-double after which everything is small enough.
-const HARD: usize = 16384;
+const HARD: usize = 8192;
 
 /// Where a point of the solid comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,8 +94,7 @@ impl Found {
         // One interior face has cells on both sides; edges depend on the other cells around them.
         let whole = marked == 1
             && (0..3).any(|k| {
-                (0..2)
-                    .any(|side| faces[k][side] && matches!(cell.faces[k][side], Face::Shared(_)))
+                (0..2).any(|side| faces[k][side] && matches!(cell.faces[k][side], Face::Shared(_)))
             });
         self.inside |= whole || marked == 0;
         self.outer |= outer;
@@ -137,7 +136,10 @@ struct Open<T> {
 }
 
 /// What a box has to say.
-#[allow(clippy::large_enum_variant, reason = "it is moved to the stack of boxes at once")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "it is moved to the stack of boxes at once"
+)]
 enum Answer<T> {
     /// Nothing more.
     Closed,
@@ -176,13 +178,7 @@ impl Cells {
     }
 
     /// Asks all leaves around the point, or until one has it inside when `one` will do.
-    fn ask(
-        &self,
-        point: DVec3,
-        error: DVec3,
-        exact: impl FnOnce() -> [Dd; 3],
-        one: bool,
-    ) -> Found {
+    fn ask(&self, point: DVec3, error: DVec3, exact: impl FnOnce() -> [Dd; 3], one: bool) -> Found {
         let (local, bound) = self.to_local(point, error);
         let mut query = Query {
             cells: self,
@@ -214,41 +210,44 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
 
     #[inline]
     fn leaf(&mut self, leaf: &Leaf) {
-        match &leaf.regular {
-            Some(regular) => self.regular(leaf, regular),
-            None => self.search(leaf.cell, leaf.window),
+        let Some(hull) = &leaf.hull else {
+            self.search(leaf.cell, leaf.window);
+            return;
+        };
+        let (p, m, by) = (self.point, hull.middle, &hull.certificate);
+        let d = [p[0] - m[0], p[1] - m[1], p[2] - m[2]];
+        let q = by.inverse.map(|r| dot(r, d));
+        // Rounding of the difference and of the product; coordinates are at most 1 here.
+        let off = by.rows.map(|r| r * (self.error + 16.0 * U));
+        let [low, high] = hull.bounds;
+        if (0..3).any(|k| q[k] < low[k] - off[k] || q[k] > high[k] + off[k]) {
+            return;
+        }
+        if leaf.regular {
+            self.regular(leaf, hull, q);
+        } else {
+            self.search(leaf.cell, leaf.window);
         }
     }
 
     /// Step 2.
     #[inline]
-    fn regular(&mut self, leaf: &Leaf, regular: &Regular) {
+    fn regular(&mut self, leaf: &Leaf, regular: &Hull, q: [f64; 3]) {
         let cells = self.cells;
         let (cell, window, p) = (&cells.cells[leaf.cell], leaf.window, self.point);
-        let Certificate {
-            inverse,
-            rows,
-            ..
-        } = regular.certificate;
-        let m = regular.middle;
-        let d = [p[0] - m[0], p[1] - m[1], p[2] - m[2]];
-        let q = inverse.map(|r| dot(r, d));
-        // Rounding of the difference and of the product; coordinates are at most 1 here.
-        let off = self.error + 16.0 * U;
-        let [low, high] = regular.hull;
-        if (0..3).any(|k| q[k] < low[k] - rows[k] * off || q[k] > high[k] + rows[k] * off) {
-            return;
-        }
+        let Certificate { inverse, rows, .. } = regular.certificate;
         let noise = cell.noise + self.error;
-        let limits = limits(cell, window, &regular.certificate, false);
+        let limits = limits(cell, window, &regular.certificate, false, !self.one);
         let start = q.map(|q| 0.5 + q * regular.weight);
+        // Leaves are wide enough for f64.
+        let low = window.low.map(Real::f64);
         let located = locate(&limits, start, |x: [f64; 3]| {
-            let t: [f64; 3] = std::array::from_fn(|k| window.low[k] + window.width[k] * x[k]);
+            let t: [f64; 3] = std::array::from_fn(|k| low[k] + window.width[k] * x[k]);
             let h = net::value_and_slopes(&cell.net, cell.counts, t);
             let f: [[f64; 3]; 4] =
                 std::array::from_fn(|i| std::array::from_fn(|c| h[i][c] - p[c] * h[i][3]));
             Sample {
-                x: std::array::from_fn(|k| (t[k] - window.low[k]) / window.width[k]),
+                x: std::array::from_fn(|k| (t[k] - low[k]) / window.width[k]),
                 value: inverse.map(|r| dot(r, f[0])),
                 error: std::array::from_fn(|k| {
                     let size = (0..3).map(|c| (inverse[k][c] * f[0][c]).abs()).sum::<f64>();
@@ -281,20 +280,21 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         let p = self.exactly();
         let cells = self.cells;
         let cell = &cells.cells[index];
-        let limits = limits(cell, window, by, true);
+        let limits = limits(cell, window, by, true, !self.one);
         let located = locate(&limits, start.map(Dd::of), |x: [Dd; 3]| {
             let t: [Dd; 3] = std::array::from_fn(|k| {
-                Dd::of(window.low[k]) + x[k].scale_by_power_of_two(window.width[k])
+                window.low[k] + x[k].scale_by_power_of_two(window.width[k])
             });
             let h = net::value_and_slopes(&cell.exact, cell.counts, t);
-            let f: [[f64; 3]; 4] = std::array::from_fn(|i| {
-                std::array::from_fn(|c| (h[i][c] - p[c] * h[i][3]).f64())
-            });
+            let f: [[f64; 3]; 4] =
+                std::array::from_fn(|i| std::array::from_fn(|c| (h[i][c] - p[c] * h[i][3]).f64()));
             Sample {
                 x,
                 value: by.inverse.map(|r| dot(r, f[0])),
                 error: std::array::from_fn(|k| {
-                    let size = (0..3).map(|c| (by.inverse[k][c] * f[0][c]).abs()).sum::<f64>();
+                    let size = (0..3)
+                        .map(|c| (by.inverse[k][c] * f[0][c]).abs())
+                        .sum::<f64>();
                     by.rows[k] * cell.exact_noise + 8.0 * U * size
                 }),
                 slopes: std::array::from_fn(|k| {
@@ -353,8 +353,9 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         let counts = problem.cell.counts;
         let mut whole: SmallVec<[Row<T, 4>; 64]> = SmallVec::from_slice(problem.net);
         for k in 0..3 {
-            let (a, b) = (window.low[k], window.low[k] + window.width[k]);
-            net::restrict(&mut whole, counts, k, T::of(a), T::of(b));
+            // The window of a leaf.
+            let a = window.low[k].f64();
+            net::restrict(&mut whole, counts, k, T::of(a), T::of(a + window.width[k]));
         }
         let mut boxes = 0;
         let mut stack: SmallVec<[Open<T>; 4]> = SmallVec::new();
@@ -436,13 +437,13 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         if quick && extent < 1e3 * noise {
             return Answer::Lost;
         }
-        let small = extent <= ON_BOUNDARY
-            || *boxes > SOFT && extent <= 2.0 * f64::EPSILON
-            || *boxes > HARD;
+        let small =
+            extent <= ON_BOUNDARY || *boxes > SOFT && extent <= 2.0 * f64::EPSILON || *boxes > HARD;
         if small {
             let faces = std::array::from_fn(|k| window.at_face(k));
             self.found.touch_small(cell, faces);
-            self.found.place(problem.index, parameters(window, [0.5; 3]));
+            self.found
+                .place(problem.index, parameters(window, [0.5; 3]));
             return Answer::Closed;
         }
         if let Some((inverse, rows)) = leaf::frame(&y, counts) {
@@ -455,15 +456,27 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
             if excluded {
                 return Answer::Closed;
             }
-            let (kappa, _) = leaf::bend(&local, counts, window.growth(), [0.0; 3], error);
-            if kappa <= leaf::MAX_KAPPA {
-                let by = Certificate {
-                    inverse,
-                    rows,
-                    kappa,
-                };
-                if self.certified(problem.index, window, &by, &local, error) {
-                    return Answer::Closed;
+            // With errors of this size nothing smaller will be decided in f64.
+            if quick && error.iter().any(|&e| e > 0.03) {
+                return Answer::Lost;
+            }
+            // The rows of DΦ sum to 1 + κ at most, and so wide is what the coefficients span.
+            let wide = (0..3).any(|c| {
+                let (low, high) =
+                    (local.iter()).fold((0.0_f64, 0.0_f64), |(l, h), b| (l.min(b[c]), h.max(b[c])));
+                high - low > 1.0 + leaf::MAX_KAPPA
+            });
+            if !wide {
+                let (kappa, _) = leaf::bend(&local, counts, window.growth(), [0.0; 3], error);
+                if kappa <= leaf::MAX_KAPPA {
+                    let by = Certificate {
+                        inverse,
+                        rows,
+                        kappa,
+                    };
+                    if self.certified(problem.index, window, &by, &local, error) {
+                        return Answer::Closed;
+                    }
                 }
             }
         }
@@ -504,9 +517,8 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
         // E reaches 1/16 outside, where the basis sums to (9/8)^p at most, in absolute values.
         let stretch = 1.125_f64.powf(degrees as f64);
         let round = gamma((4 * degrees + 8) as f64);
-        let error: [f64; 3] =
-            std::array::from_fn(|c| stretch * (error[c] + round * size[c]));
-        let limits = limits(cell, window, by, false);
+        let error: [f64; 3] = std::array::from_fn(|c| stretch * (error[c] + round * size[c]));
+        let limits = limits(cell, window, by, false, !self.one);
         let located = locate(&limits, [0.5; 3], |x: [f64; 3]| {
             let h = net::value_and_slopes(local, counts, x);
             let part = |i: usize| [h[i][0], h[i][1], h[i][2]];
@@ -532,21 +544,20 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
 impl Found {
     /// A box of no size, or one that the bound on the work left over, meets the point.
     fn touch_small(&mut self, cell: &Cell, faces: [[bool; 2]; 3]) {
-        let outer = (0..3).any(|k| {
-            (0..2).any(|side| faces[k][side] && cell.faces[k][side] == Face::Outer)
-        });
+        let outer =
+            (0..3).any(|k| (0..2).any(|side| faces[k][side] && cell.faces[k][side] == Face::Outer));
         self.outer |= outer;
         self.shared |= !outer;
     }
 }
 
 fn parameters(window: Window, x: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| window.low[k] + window.width[k] * x[k])
+    std::array::from_fn(|k| (window.low[k] + Dd::product(window.width[k], x[k])).f64())
 }
 
 /// The tolerances at the sides of a window, in its local coordinates.
 #[inline]
-fn limits(cell: &Cell, window: Window, by: &Certificate, exact: bool) -> Limits {
+fn limits(cell: &Cell, window: Window, by: &Certificate, exact: bool, refine: bool) -> Limits {
     // A length of 1 at the root is at most this in local coordinates, where W <= 1.
     let length = by.rows.map(|r| r / (1.0 - by.kappa));
     let on = length.map(|l| if exact { l * ON_BOUNDARY } else { 0.0 });
@@ -568,5 +579,6 @@ fn limits(cell: &Cell, window: Window, by: &Certificate, exact: bool) -> Limits 
         kappa: by.kappa,
         outside,
         on,
+        refine,
     }
 }

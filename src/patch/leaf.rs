@@ -21,6 +21,7 @@
 use super::cells::Cell;
 use super::net::{self, Counts, Row};
 use crate::math::tolerance::{U, gamma};
+use crate::math::{Dd, Real};
 use smallvec::SmallVec;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -36,7 +37,7 @@ const GROWTH_AT_FACE: f64 = 1.0 / (1_u32 << 20) as f64;
 
 /// Width of the smallest leaves. A map that is singular on a line needs leaves in proportion to the
 /// logarithm of this; what is nearer to the line is searched when asked for.
-const SMALLEST: f64 = 1.0 / 2048.0;
+const SMALLEST: f64 = 1.0 / 256.0;
 
 /// Leaves of all cells together, about.
 const LEAVES: usize = 1 << 15;
@@ -47,7 +48,8 @@ pub(super) type LocalNet = SmallVec<[Row<f64, 4>; 64]>;
 /// A box of a cell's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Window {
-    pub(super) low: [f64; 3],
+    /// Multiples of the width. Near 1 they take more than the 53 bits of f64.
+    pub(super) low: [Dd; 3],
     /// Powers of two.
     pub(super) width: [f64; 3],
 }
@@ -70,25 +72,27 @@ pub(super) struct Leaf {
     pub(super) window: Window,
     /// Box around its image.
     pub(super) bounds: [[f64; 3]; 2],
-    /// `None` where the map could not be certified.
-    pub(super) regular: Option<Regular>,
+    /// `None` where the mean slopes have no inverse.
+    pub(super) hull: Option<Hull>,
+    /// Whether the map is certified, by the hull's certificate.
+    pub(super) regular: bool,
 }
 
-/// The certificate of a leaf for every point that its hull holds.
+/// A box along the mean slopes, with what certifies the map for every point it holds.
 #[derive(Debug, Clone)]
-pub(super) struct Regular {
+pub(super) struct Hull {
     pub(super) certificate: Certificate,
     /// m.
     pub(super) middle: [f64; 3],
     /// W at the middle of the window.
     pub(super) weight: f64,
     /// Bounds of q over the image.
-    pub(super) hull: [[f64; 3]; 2],
+    pub(super) bounds: [[f64; 3]; 2],
 }
 
 impl Window {
     pub(super) const CELL: Self = Self {
-        low: [0.0; 3],
+        low: [Dd::ZERO; 3],
         width: [1.0; 3],
     };
 
@@ -96,8 +100,8 @@ impl Window {
     #[inline]
     pub(super) fn at_face(&self, axis: usize) -> [bool; 2] {
         [
-            self.low[axis] == 0.0,
-            self.low[axis] + self.width[axis] == 1.0,
+            self.low[axis] == Dd::ZERO,
+            self.low[axis] + Dd::of(self.width[axis]) == Dd::ONE,
         ]
     }
 
@@ -114,7 +118,7 @@ impl Window {
         let mut half = *self;
         half.width[axis] *= 0.5;
         if side == 1 {
-            half.low[axis] += half.width[axis];
+            half.low[axis] = half.low[axis] + Dd::of(half.width[axis]);
         }
         half
     }
@@ -146,9 +150,7 @@ pub(super) fn invert(columns: [[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
     if !(det.abs() > 1e-15) {
         return None;
     }
-    Some(std::array::from_fn(|k| {
-        rows[k].map(|c| c / det * scale[k])
-    }))
+    Some(std::array::from_fn(|k| rows[k].map(|c| c / det * scale[k])))
 }
 
 /// C for the values `y` of A - p W: the inverse of the mean differences across the net.
@@ -305,9 +307,10 @@ impl Part {
     }
 }
 
-/// The order in which parts are split: the one with the largest box first, as most points meet it.
+/// The order in which parts are split: the one whose box has the largest surface first. A box's
+/// surface is what lines and surfaces in any place meet in proportion.
 struct Turn {
-    volume: f64,
+    surface: f64,
     /// Earlier ones first among equals.
     number: Reverse<usize>,
     part: Part,
@@ -316,10 +319,10 @@ struct Turn {
 impl Turn {
     fn new(number: usize, part: Part) -> Self {
         let [low, high] = part.leaf.bounds;
-        // Boxes of flat parts have a volume too.
-        let volume = (0..3).map(|k| (high[k] - low[k]).max(1e-3)).product();
+        let d: [f64; 3] = std::array::from_fn(|k| high[k] - low[k]);
+        let surface = d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
         Self {
-            volume,
+            surface,
             number: Reverse(number),
             part,
         }
@@ -328,7 +331,7 @@ impl Turn {
 
 impl Ord for Turn {
     fn cmp(&self, other: &Self) -> Ordering {
-        (self.volume.total_cmp(&other.volume)).then(self.number.cmp(&other.number))
+        (self.surface.total_cmp(&other.surface)).then(self.number.cmp(&other.number))
     }
 }
 
@@ -346,18 +349,18 @@ impl PartialEq for Turn {
 
 impl Eq for Turn {}
 
-/// Splits a cell into leaves and appends them.
-pub(super) fn presplit(index: usize, cell: &Cell, cells: usize, leaves: &mut Vec<Leaf>) {
+/// The leaves of a cell.
+pub(super) fn presplit(index: usize, cell: &Cell, cells: usize) -> Vec<Leaf> {
+    let mut leaves = Vec::new();
     // Bounds on memory and on the time this takes: leaves of all cells, and coefficients handled.
     let limit = (LEAVES / cells.max(1)).min((1 << 20) / cell.net.len());
-    let limit = limit.clamp(32, 4096);
-    let first = leaves.len();
+    let limit = limit.clamp(32, 8192);
     let whole = examine(index, cell, Window::CELL, cell.net.clone(), 0);
     let mut queue = BinaryHeap::from([Turn::new(0, whole)]);
     let mut number = 0;
     while let Some(Turn { part, .. }) = queue.pop() {
-        let full = leaves.len() - first + queue.len() >= limit;
-        if part.leaf.regular.is_some() || full {
+        let full = leaves.len() + queue.len() >= limit;
+        if part.leaf.regular || full {
             leaves.push(part.leaf);
             continue;
         }
@@ -369,7 +372,7 @@ pub(super) fn presplit(index: usize, cell: &Cell, cells: usize, leaves: &mut Vec
         }
         for half in halves {
             // What is decided already takes no part in the order.
-            if half.leaf.regular.is_some() {
+            if half.leaf.regular {
                 leaves.push(half.leaf);
             } else {
                 number += 1;
@@ -377,6 +380,7 @@ pub(super) fn presplit(index: usize, cell: &Cell, cells: usize, leaves: &mut Vec
             }
         }
     }
+    leaves
 }
 
 /// The leaf of a window.
@@ -403,7 +407,8 @@ fn examine(
         cell: index,
         window,
         bounds,
-        regular: None,
+        hull: None,
+        regular: false,
     };
     let h = net::value(&net, counts, [0.5; 3]);
     let middle = [h[0] / h[3], h[1] / h[3], h[2] / h[3]];
@@ -437,18 +442,17 @@ fn examine(
     }
     let reach = std::array::from_fn(|c| hull[0][c].abs().max(hull[1][c].abs()));
     let (kappa, bends) = bend(&local, counts, window.growth(), reach, error);
-    if kappa <= MAX_KAPPA {
-        leaf.regular = Some(Regular {
-            certificate: Certificate {
-                inverse,
-                rows,
-                kappa,
-            },
-            middle,
-            weight: h[3],
-            hull,
-        });
-    }
+    leaf.regular = kappa <= MAX_KAPPA;
+    leaf.hull = Some(Hull {
+        certificate: Certificate {
+            inverse,
+            rows,
+            kappa,
+        },
+        middle,
+        weight: h[3],
+        bounds: hull,
+    });
     Part {
         leaf,
         net,
@@ -519,7 +523,10 @@ fn grow(leaves: &[Leaf], order: &mut [usize], nodes: &mut Vec<Node>, sorted: &mu
         }
     }
     let place = nodes.len();
-    #[allow(clippy::cast_possible_truncation, reason = "some 2^15 leaves, or 32 for a cell")]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "some 2^15 leaves, or 32 for a cell"
+    )]
     let short = |n: usize| n as u32;
     let leaf = if order.len() == 1 {
         sorted.push(order[0]);

@@ -40,6 +40,8 @@ pub(super) struct Limits {
     pub(super) outside: [[f64; 2]; 3],
     /// How far inside of a face of the cell a root still counts as on it.
     pub(super) on: [f64; 3],
+    /// Whether the root itself is wanted, to rounding, and not only where it is.
+    pub(super) refine: bool,
 }
 
 /// Where the root is.
@@ -74,10 +76,10 @@ pub(super) fn locate<T: Real>(
                 low
             } else if x[k] > high {
                 high
-            } else if x[k] == x[k] {
-                x[k]
-            } else {
+            } else if x[k].f64().is_nan() {
                 T::of(0.5)
+            } else {
+                x[k]
             }
         })
     };
@@ -108,11 +110,16 @@ pub(super) fn locate<T: Real>(
             }
         }
         let at = x.map(Real::f64);
-        if exists && inside {
-            return Located::Inside(at);
-        }
         // Below its error a value has nothing more to say.
         let settled = size <= 4.0 * noise || step + 1 == STEPS;
+        if exists && inside && !limits.refine {
+            return Located::Inside(at);
+        }
+        if exists && inside && settled {
+            // One more step, to what f64 has.
+            let last = invert(s.slopes).map_or(s.value, |inverse| inverse.map(|r| dot(r, s.value)));
+            return Located::Inside(std::array::from_fn(|k| at[k] - last[k]));
+        }
         if settled && exists {
             return Located::Near(at, near);
         }
@@ -129,7 +136,9 @@ pub(super) fn locate<T: Real>(
             simple = true;
             next = clamp(std::array::from_fn(|k| x[k] - T::of(s.value[k])));
             if next == x {
-                return if exists {
+                return if exists && inside {
+                    Located::Inside(at)
+                } else if exists {
                     Located::Near(at, near)
                 } else {
                     Located::Unclear

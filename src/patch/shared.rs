@@ -111,9 +111,8 @@ impl Candidate {
         let [n, m] = self.counts;
         let all = |same: &dyn Fn(usize, usize) -> usize| {
             (0..n).all(|i| {
-                (0..m).all(|j| {
-                    distance(self.points[i + j * n], self.points[same(i, j)]) <= tolerance
-                })
+                (0..m)
+                    .all(|j| distance(self.points[i + j * n], self.points[same(i, j)]) <= tolerance)
             })
         };
         all(&|_, j| j * n) || all(&|i, _| i)

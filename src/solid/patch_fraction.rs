@@ -34,6 +34,16 @@ struct Part {
     outward: f64,
 }
 
+/// A difference of two results, as a share of the voxel, below which the finer one is good: its own
+/// error is several times less.
+const AGREE: f64 = 3e-7;
+
+/// Halvings of a voxel that has no corner clear of the surface.
+const DEEPEST: u32 = 3;
+
+/// What is known of a corner: whether it is inside, and how far from the surface.
+type Known = SmallVec<[(DVec3, bool, f64); 8]>;
+
 impl Patches {
     pub(super) fn fraction_within(
         &self,
@@ -42,22 +52,44 @@ impl Patches {
         spaces: &[HalfSpace],
         tolerance: f64,
     ) -> f64 {
-        let tetrahedra = box_tetrahedra_within(0.5 * sides, spaces);
-        let parts = self.parts(sides, centre);
-        let mut known: SmallVec<[(DVec3, bool); 4]> = SmallVec::new();
-        let mut inside = |corner: DVec3| {
-            if let Some((_, answer)) = known.iter().find(|(c, _)| *c == corner) {
-                return *answer;
-            }
-            let answer = self.side(centre + corner) != Side::Outside;
-            known.push((corner, answer));
-            answer
+        let agree = tolerance.max(AGREE);
+        let share = self.share_within(sides, centre, spaces, agree, 0);
+        if share < SNAP {
+            0.0
+        } else if share > 1.0 - SNAP {
+            1.0
+        } else {
+            share
+        }
+    }
+
+    fn share_within(
+        &self,
+        sides: DVec3,
+        centre: DVec3,
+        spaces: &[HalfSpace],
+        agree: f64,
+        depth: u32,
+    ) -> f64 {
+        let mut tetrahedra = box_tetrahedra_within(0.5 * sides, spaces);
+        let Some(starts) = self.starts(&mut tetrahedra, sides, centre, depth) else {
+            let eighths = (0..8_u32).map(|n| {
+                let side = |bit: u32| if n >> bit & 1 == 1 { 0.25 } else { -0.25 };
+                let by = sides * DVec3::new(side(0), side(1), side(2));
+                let moved = spaces.iter().map(|s| HalfSpace {
+                    normal: s.normal,
+                    offset: s.offset - s.normal.dot(by),
+                });
+                let moved: SmallVec<[HalfSpace; 4]> = moved.collect();
+                self.share_within(0.5 * sides, centre + by, &moved, agree, depth + 1)
+            });
+            return eighths.sum::<f64>() / 8.0;
         };
-        let starts: Vec<bool> = tetrahedra.iter().map(|t| inside(t[START])).collect();
+        let parts = self.parts(sides, centre);
         let volume = sides.element_product();
         let whole = |n: u32| -> f64 {
-            let triangles: Vec<[DVec3; 3]> =
-                parts.iter().flat_map(|p| p.triangles(n, self.frame())).collect();
+            let triangles = parts.iter().flat_map(|p| p.triangles(n, self.frame()));
+            let triangles: Vec<[DVec3; 3]> = triangles.collect();
             let shares = tetrahedra.iter().zip(&starts);
             let shares = shares.map(|(t, start)| share(t, *start, &triangles));
             shares.sum::<f64>() / volume
@@ -68,21 +100,54 @@ impl Patches {
             let next = whole(1 << level);
             // c/n² removed.
             let better = next + (next - last) / 3.0;
-            let done = settled.is_some_and(|s| (better - s).abs() <= tolerance);
+            let done = settled.is_some_and(|s| (better - s).abs() <= agree);
             settled = Some(better);
             last = next;
             if done || parts.is_empty() {
                 break;
             }
         }
-        let share = settled.unwrap_or(last);
-        if share < SNAP {
-            0.0
-        } else if share > 1.0 - SNAP {
-            1.0
-        } else {
-            share
+        settled.unwrap_or(last)
+    }
+
+    /// Puts the corner of each tetrahedron that is furthest from the surface first, and tells whether
+    /// it is inside. On the surface itself a triangulation has no say, and faces that lie in those of
+    /// the tetrahedron must lie in the one opposite to the start. `None` where a tetrahedron has no
+    /// corner clear of the surface.
+    fn starts(
+        &self,
+        tetrahedra: &mut [Tetrahedron],
+        sides: DVec3,
+        centre: DVec3,
+        depth: u32,
+    ) -> Option<SmallVec<[bool; 32]>> {
+        let clear = 0.02 * sides.min_element();
+        let mut known = Known::new();
+        let mut starts = SmallVec::new();
+        for tetrahedron in tetrahedra {
+            let mut best: Option<(usize, bool, f64)> = None;
+            for k in 0..4 {
+                let corner = tetrahedron[k];
+                let found = known.iter().find(|(c, ..)| *c == corner).copied();
+                let (_, inside, distance) = found.unwrap_or_else(|| {
+                    let point = centre + corner;
+                    let inside = self.side(point) != Side::Outside;
+                    let one = (corner, inside, self.distance(point, inside, f64::INFINITY));
+                    known.push(one);
+                    one
+                });
+                if best.is_none_or(|(.., most)| distance > most) {
+                    best = Some((k, inside, distance));
+                }
+            }
+            let (k, inside, distance) = best?;
+            if distance < clear && depth < DEEPEST {
+                return None;
+            }
+            tetrahedron.swap(0, k);
+            starts.push(inside);
         }
+        Some(starts)
     }
 
     /// The parts of faces that may reach into the voxel, halved until none is much larger.
@@ -130,11 +195,8 @@ impl Patches {
     }
 }
 
-/// The corner of a tetrahedron at which the last edge starts: the one that those of a box share.
-const START: usize = 0;
-
 /// The volume of the solid in a tetrahedron, by the surface's triangles (both from the voxel's centre,
-/// scene units) and whether its corner [`START`] is inside.
+/// scene units) and whether its first corner, where the last edge starts, is inside.
 fn share(corners: &Tetrahedron, start: bool, triangles: &[[DVec3; 3]]) -> f64 {
     let [b, o, a, c] = *corners;
     let (e1, e2, e3) = (a - o, b - o, c - o);

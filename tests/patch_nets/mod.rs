@@ -9,20 +9,20 @@ use voxlathe::nurbs::{KnotVector, NurbsVolume};
 use voxlathe::patch::Cells;
 
 /// A small generator: the tests are the same every time.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
-    pub fn within(&mut self, a: f64, b: f64) -> f64 {
+    pub(crate) fn within(&mut self, a: f64, b: f64) -> f64 {
         a + (b - a) * self.unit()
     }
-    pub fn direction(&mut self) -> DVec3 {
+    pub(crate) fn direction(&mut self) -> DVec3 {
         loop {
             let v = DVec3::from_array(std::array::from_fn(|_| self.within(-1.0, 1.0)));
             if v.length() > 0.1 && v.length() < 1.0 {
@@ -34,9 +34,9 @@ impl Random {
 
 /// A rational spline: knots, points and weights.
 #[derive(Clone)]
-pub struct Spline<const D: usize> {
-    pub knots: KnotVector,
-    pub points: Vec<([f64; D], f64)>,
+pub(crate) struct Spline<const D: usize> {
+    pub(crate) knots: KnotVector,
+    pub(crate) points: Vec<([f64; D], f64)>,
 }
 
 fn knots(degree: usize, breaks: usize) -> KnotVector {
@@ -48,7 +48,7 @@ fn knots(degree: usize, breaks: usize) -> KnotVector {
     KnotVector::new(degree, u).expect("valid")
 }
 
-pub fn line(a: [f64; 2], b: [f64; 2]) -> Spline<2> {
+pub(crate) fn line(a: [f64; 2], b: [f64; 2]) -> Spline<2> {
     Spline {
         knots: knots(1, 1),
         points: vec![(a, 1.0), (b, 1.0)],
@@ -56,7 +56,7 @@ pub fn line(a: [f64; 2], b: [f64; 2]) -> Spline<2> {
 }
 
 /// The full circle with nine points.
-pub fn circle() -> Spline<2> {
+pub(crate) fn circle() -> Spline<2> {
     let square = [
         [1.0, 0.0],
         [1.0, 1.0],
@@ -68,7 +68,7 @@ pub fn circle() -> Spline<2> {
         [1.0, -1.0],
         [1.0, 0.0],
     ];
-    let weight = |i: usize| if i % 2 == 0 { 1.0 } else { S };
+    let weight = |i: usize| if i.is_multiple_of(2) { 1.0 } else { S };
     Spline {
         knots: knots(2, 4),
         points: (0..9).map(|i| (square[i], weight(i))).collect(),
@@ -76,13 +76,17 @@ pub fn circle() -> Spline<2> {
 }
 
 /// An arc of the unit circle from the angle 0.
-pub fn arc(angle: f64) -> Spline<2> {
+pub(crate) fn arc(angle: f64) -> Spline<2> {
     let n = (angle / (TAU / 4.0)).ceil() as usize;
     let d = angle / n as f64;
     let mut points = Vec::new();
     for i in 0..=2 * n {
         let (phi, c) = (i as f64 * d / 2.0, (d / 2.0).cos());
-        let (r, w) = if i % 2 == 0 { (1.0, 1.0) } else { (1.0 / c, c) };
+        let (r, w) = if i.is_multiple_of(2) {
+            (1.0, 1.0)
+        } else {
+            (1.0 / c, c)
+        };
         points.push(([r * phi.cos(), r * phi.sin()], w));
     }
     Spline {
@@ -92,9 +96,9 @@ pub fn arc(angle: f64) -> Spline<2> {
 }
 
 /// A half circle in the meridian half-plane, from the south pole to the north pole.
-pub fn meridian(radius: f64) -> Spline<2> {
+pub(crate) fn meridian(radius: f64) -> Spline<2> {
     let p = [[0.0, -1.0], [1.0, -1.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-    let weight = |i: usize| if i % 2 == 0 { 1.0 } else { S };
+    let weight = |i: usize| if i.is_multiple_of(2) { 1.0 } else { S };
     Spline {
         knots: knots(2, 2),
         points: (0..5)
@@ -104,7 +108,7 @@ pub fn meridian(radius: f64) -> Spline<2> {
 }
 
 /// The biquadratic disc, its first point at (1, 0).
-pub fn disc() -> Vec<([f64; 2], f64)> {
+pub(crate) fn disc() -> Vec<([f64; 2], f64)> {
     let rows = [
         [[-S, -S], [0.0, -2.0 * S], [S, -S]],
         [[-2.0 * S, 0.0], [0.0, 0.0], [2.0 * S, 0.0]],
@@ -125,7 +129,7 @@ fn times(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 }
 
 /// Construction a: every profile point (r, z) times the biquadratic disc.
-pub fn by_disc(profile: &Spline<2>) -> NurbsVolume {
+pub(crate) fn by_disc(profile: &Spline<2>) -> NurbsVolume {
     let (mut points, mut weights) = (Vec::new(), Vec::new());
     for (d, q) in disc() {
         for &([r, z], w) in &profile.points {
@@ -138,7 +142,7 @@ pub fn by_disc(profile: &Spline<2>) -> NurbsVolume {
 }
 
 /// Construction b: a meridian net, first index fastest, times a circle or an arc.
-pub fn by_circle(
+pub(crate) fn by_circle(
     u: KnotVector,
     v: KnotVector,
     net: &[([f64; 2], f64)],
@@ -155,7 +159,7 @@ pub fn by_circle(
 }
 
 /// Construction c: the ruled surface to the axis, turned.
-pub fn by_axis(profile: &Spline<2>, circle: &Spline<2>) -> NurbsVolume {
+pub(crate) fn by_axis(profile: &Spline<2>, circle: &Spline<2>) -> NurbsVolume {
     let mut net: Vec<_> = (profile.points.iter())
         .map(|&([_, z], w)| ([0.0, z], w))
         .collect();
@@ -165,7 +169,7 @@ pub fn by_axis(profile: &Spline<2>, circle: &Spline<2>) -> NurbsVolume {
 }
 
 /// The ring torus.
-pub fn torus(major: f64, minor: f64, circle: &Spline<2>) -> NurbsVolume {
+pub(crate) fn torus(major: f64, minor: f64, circle: &Spline<2>) -> NurbsVolume {
     let net: Vec<_> = (disc().into_iter())
         .map(|(d, w)| ([major + minor * d[0], minor * d[1]], w))
         .collect();
@@ -174,24 +178,27 @@ pub fn torus(major: f64, minor: f64, circle: &Spline<2>) -> NurbsVolume {
 }
 
 /// The volume with its points mapped.
-pub fn mapped(v: &NurbsVolume, map: impl Fn([f64; 3]) -> [f64; 3]) -> NurbsVolume {
+pub(crate) fn mapped(v: &NurbsVolume, map: impl Fn([f64; 3]) -> [f64; 3]) -> NurbsVolume {
     let points = v.control_points().iter().map(|&p| map(p)).collect();
     NurbsVolume::new(v.knots().clone(), points, v.weights().to_vec()).expect("valid")
 }
 
-pub fn side(cells: &Cells, p: DVec3) -> Side {
+pub(crate) fn side(cells: &Cells, p: DVec3) -> Side {
     cells.side(p, DVec3::ZERO, || p.to_array().map(Dd::of))
 }
 
+/// A place and a direction.
+type Across = dyn Fn(&mut Random) -> (DVec3, DVec3);
+
 /// A solid in closed form.
-pub struct Solid {
-    pub name: String,
-    pub volumes: Vec<NurbsVolume>,
+pub(crate) struct Solid {
+    pub(crate) name: String,
+    pub(crate) volumes: Vec<NurbsVolume>,
     /// Signed distance, negative inside; a bound of the same sign will do away from the surface.
-    pub sdf: Box<dyn Fn(DVec3) -> f64>,
+    pub(crate) sdf: Box<dyn Fn(DVec3) -> f64>,
     /// A point of the surface and a direction across it.
-    pub surface: Box<dyn Fn(&mut Random) -> (DVec3, DVec3)>,
-    pub size: f64,
+    pub(crate) surface: Box<Across>,
+    pub(crate) size: f64,
 }
 
 fn polar(rho: f64, phi: f64, z: f64) -> DVec3 {
@@ -261,7 +268,7 @@ fn wedge(p: DVec3, angle: f64) -> f64 {
     }
 }
 
-pub fn solids() -> Vec<Solid> {
+pub(crate) fn solids() -> Vec<Solid> {
     let mut out = Vec::new();
     let mut add = |name: &str,
                    volumes: Vec<NurbsVolume>,
