@@ -13,7 +13,11 @@ fn scene(solids: &str) -> Scene {
 
 /// Numbers in [0, 1) that fill it evenly.
 fn share(n: u32, k: u32) -> f64 {
-    let step = [0.754_877_666_246_693, 0.569_840_290_998_053, 0.361_803_398_874_989][k as usize];
+    let step = [
+        0.754_877_666_246_693,
+        0.569_840_290_998_053,
+        0.361_803_398_874_989,
+    ][k as usize];
     (f64::from(n) * step).fract()
 }
 
@@ -65,7 +69,10 @@ fn round_kinds_are_profiles_turned() {
             assert_eq!(short.measures(), long.measures());
             for p in points(&short, 500) {
                 let (a, b) = (short.assembly(), long.assembly());
-                assert_eq!(a.signed_distance(p).to_bits(), b.signed_distance(p).to_bits());
+                assert_eq!(
+                    a.signed_distance(p).to_bits(),
+                    b.signed_distance(p).to_bits()
+                );
             }
         }
     }
@@ -97,10 +104,11 @@ fn a_spindle_torus_is_filled() {
     assert!((found - volume).abs() < 1e-14 * volume, "{found} {volume}");
 }
 
-
 #[test]
 fn boxes_are_closed_and_exact() {
-    let b = scene("[[solid]]\nkind = 'box'\nsize = [0.2, 0.6, 1.4]\nplace = [{ translate = [0.1, 0.3, 0.7] }]");
+    let b = scene(
+        "[[solid]]\nkind = 'box'\nsize = [0.2, 0.6, 1.4]\nplace = [{ translate = [0.1, 0.3, 0.7] }]",
+    );
     let held = |p: [f64; 3]| b.assembly().contains(p.into());
     // The sums of the decimals, not what f64 rounds them to.
     assert!(held([0.0, 0.0, 0.0]) && held([0.2, 0.6, 1.4]));
@@ -109,7 +117,9 @@ fn boxes_are_closed_and_exact() {
     assert_eq!(sd([0.1, 0.3, 0.7]), -0.1);
     assert!((sd([0.2 + 0.3, 0.6 + 0.4, 0.7]) - 0.5).abs() < 1e-15);
     assert_eq!(sd([0.2, 0.1, 0.3]), 0.0);
-    let tilted = scene(&format!("[[solid]]\nkind = 'box'\nsize = [2, 1, 0.5]\n{PLACED}"));
+    let tilted = scene(&format!(
+        "[[solid]]\nkind = 'box'\nsize = [2, 1, 0.5]\n{PLACED}"
+    ));
     let found = tilted.measures().expect("one solid");
     let volume = 1.5_f64.powi(3);
     assert!((found.volume - volume).abs() <= found.error_estimate.volume);
@@ -163,7 +173,10 @@ fn ellipsoid_distance(radii: [f64; 3], point: [f64; 3]) -> f64 {
         .map(|i| &r[i] * &r[i] * &x[i] / (&high + &r[i] * &r[i]))
         .collect();
     // Along the least axis whatever is left.
-    let axis = radii.iter().position(|&v| v == least).expect("one of three");
+    let axis = radii
+        .iter()
+        .position(|&v| v == least)
+        .expect("one of three");
     let rest = (0..3).filter(|&i| i != axis).fold(big(1.0), |s, i| {
         let q = &foot[i] / &r[i];
         s - &q * &q
@@ -248,7 +261,10 @@ fn grids_agree_with_points() {
             }
             let exact = one.exact_volume().expect("few solids");
             let found = volume * grid.spacing().element_product();
-            assert!((found - exact).abs() < 1e-6 * exact, "{text}: {found} {exact}");
+            assert!(
+                (found - exact).abs() < 1e-6 * exact,
+                "{text}: {found} {exact}"
+            );
         }
     }
 }
@@ -267,15 +283,31 @@ fn booleans_of_boxes_and_ellipsoids_have_known_measures() {
     let check = |what: &str, found: f64, wanted: f64, estimate: f64| {
         let error = (found - wanted).abs();
         eprintln!("{what}: off by {error:e}, estimate {estimate:e}");
-        assert!(error <= estimate + 1e-14 * wanted.abs(), "{what}: {found} {wanted}");
+        assert!(
+            error <= estimate + 1e-14 * wanted.abs(),
+            "{what}: {found} {wanted}"
+        );
         assert!(estimate < 1e-9 * wanted.abs(), "{what}: {estimate}");
     };
-    check("volume of the octant", part.volume, PI, part.error_estimate.volume);
+    check(
+        "volume of the octant",
+        part.volume,
+        PI,
+        part.error_estimate.volume,
+    );
     let quarters = PI / 4.0 * (3.0 * 2.0 + 2.0 * 1.0 + 1.0 * 3.0);
-    check("its area", part.area, all.area / 8.0 + quarters, part.error_estimate.area);
+    check(
+        "its area",
+        part.area,
+        all.area / 8.0 + quarters,
+        part.error_estimate.area,
+    );
     let centroid = part.centroid.expect("not empty");
     let wanted = DVec3::new(9.0, 6.0, 3.0) / 8.0;
-    assert!((centroid - wanted).length() <= part.error_estimate.centroid + 1e-14, "{centroid}");
+    assert!(
+        (centroid - wanted).length() <= part.error_estimate.centroid + 1e-14,
+        "{centroid}"
+    );
     let bounds = part.bounds.expect("not empty");
     assert!((bounds.max - DVec3::new(3.0, 2.0, 1.0)).abs().max_element() < 1e-9);
 
@@ -284,7 +316,12 @@ fn booleans_of_boxes_and_ellipsoids_have_known_measures() {
          [[solid]]\nkind = 'cylinder'\nradius = 1\nheight = 4\naxis = { origin = [0, 0, -2] }\noperation = 'subtract'",
     );
     let found = drilled.measures().expect("two solids");
-    check("drilled box", found.volume, 24.0 - 2.0 * PI, found.error_estimate.volume);
+    check(
+        "drilled box",
+        found.volume,
+        24.0 - 2.0 * PI,
+        found.error_estimate.volume,
+    );
     check(
         "its area",
         found.area,
@@ -311,11 +348,29 @@ fn bad_sizes_are_refused_with_their_place() {
         assert!(error.contains(wanted), "{text}: {error}");
     };
     refused("kind = 'box'\nsize = [1, 2]", "<text>:4:8: solid[0].size");
-    refused("kind = 'box'\nsize = [1, 2, 0]", "<text>:4:15: solid[0].size[2]");
-    refused("kind = 'ellipsoid'\nradii = [1, 1e-12, 1]", "none is below 1e-8 of the largest");
-    refused("kind = 'torus'\nmajor = 1", "solid[0]: found no key `minor`");
-    refused("kind = 'cone'\nradius1 = 0\nradius2 = 0\nheight = 1", "a radius greater than 0");
-    refused("kind = 'sphere'\nradius = -1", "<text>:4:10: solid[0].radius");
+    refused(
+        "kind = 'box'\nsize = [1, 2, 0]",
+        "<text>:4:15: solid[0].size[2]",
+    );
+    refused(
+        "kind = 'ellipsoid'\nradii = [1, 1e-12, 1]",
+        "none is below 1e-8 of the largest",
+    );
+    refused(
+        "kind = 'torus'\nmajor = 1",
+        "solid[0]: found no key `minor`",
+    );
+    refused(
+        "kind = 'cone'\nradius1 = 0\nradius2 = 0\nheight = 1",
+        "a radius greater than 0",
+    );
+    refused(
+        "kind = 'sphere'\nradius = -1",
+        "<text>:4:10: solid[0].radius",
+    );
     refused("kind = 'shpere'\nradius = 1", "did you mean `sphere`?");
-    refused("kind = 'box'\nsize = [1, 1, 1]\nangle = 90", "unknown key `angle`");
+    refused(
+        "kind = 'box'\nsize = [1, 1, 1]\nangle = 90",
+        "unknown key `angle`",
+    );
 }

@@ -348,10 +348,9 @@ fn stream(
     console: &Console,
 ) -> Result<(f64, f64, Tally), Failure> {
     let interrupted = || interrupt::check().is_err();
-    let sampler =
-        LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
-            .with_scalars(plan.scalars.clone())
-            .with_cancel(&interrupted);
+    let sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
+        .with_scalars(plan.scalars.clone())
+        .with_cancel(&interrupted);
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
@@ -374,7 +373,10 @@ fn stream(
             material: plan.selection.material.then_some(&buffers.material),
         };
         let mut samples = layer.list();
-        let names = plan.channels.iter().filter(|c| ChannelName::from_name(&c.name).is_none());
+        let names = plan
+            .channels
+            .iter()
+            .filter(|c| ChannelName::from_name(&c.name).is_none());
         let scalars = names.zip(&buffers.scalars);
         samples.extend(scalars.map(|(c, values)| (c.name.as_str(), Samples::Float(values))));
         writer.write_samples(k, &samples)?;

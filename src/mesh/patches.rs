@@ -107,7 +107,13 @@ impl Welded {
         // The hair's box touches at most eight cells.
         let mut seen: Vec<[i64; 3]> = Vec::with_capacity(8);
         for n in 0..8_u32 {
-            let side = |bit: u32| if n >> bit & 1 == 1 { self.hair } else { -self.hair };
+            let side = |bit: u32| {
+                if n >> bit & 1 == 1 {
+                    self.hair
+                } else {
+                    -self.hair
+                }
+            };
             let at = cell(p + DVec3::new(side(0), side(1), side(2)));
             if !seen.contains(&at) {
                 seen.push(at);
@@ -120,7 +126,10 @@ impl Welded {
                 }
             }
         }
-        #[allow(clippy::cast_possible_truncation, reason = "below the limit of triangles")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "below the limit of triangles"
+        )]
         let k = self.points.len() as u32;
         self.points.push(p);
         self.cells.entry(cell(p)).or_default().push(k);
@@ -134,7 +143,10 @@ fn add(face: &OuterFace, n: u32, welded: &mut Welded, triangles: &mut Vec<[u32; 
     for j in 0..=n {
         for i in 0..=n {
             let at = [i, j].map(|k| f64::from(k) / f64::from(n));
-            let point = face.surface.evaluate(at).map_or(DVec3::ZERO, DVec3::from_array);
+            let point = face
+                .surface
+                .evaluate(at)
+                .map_or(DVec3::ZERO, DVec3::from_array);
             grid.push(welded.index(point));
         }
     }
@@ -145,7 +157,11 @@ fn add(face: &OuterFace, n: u32, welded: &mut Welded, triangles: &mut Vec<[u32; 
             for [a, b, c] in [[a, b, c], [a, c, d]] {
                 // Where an edge is collapsed a triangle is.
                 if a != b && b != c && c != a {
-                    triangles.push(if face.outward >= 0 { [a, b, c] } else { [a, c, b] });
+                    triangles.push(if face.outward >= 0 {
+                        [a, b, c]
+                    } else {
+                        [a, c, b]
+                    });
                 }
             }
         }
@@ -154,9 +170,9 @@ fn add(face: &OuterFace, n: u32, welded: &mut Welded, triangles: &mut Vec<[u32; 
 
 /// The largest deviation of n × n cells' triangles from the faces.
 fn largest_error(faces: &[OuterFace], n: u32) -> f64 {
-    let cells = faces.par_iter().flat_map_iter(|face| {
-        (0..n * n).map(move |k| (face, [k % n, k / n]))
-    });
+    let cells = faces
+        .par_iter()
+        .flat_map_iter(|face| (0..n * n).map(move |k| (face, [k % n, k / n])));
     cells
         .map(|(face, at)| {
             let low = at.map(|k| f64::from(k) / f64::from(n));
@@ -177,9 +193,7 @@ fn deviation(cell: &BezierCell<2>) -> f64 {
     let corners = [corner(0, 0), corner(p, 0), corner(0, q), corner(p, q)];
     let origin = corners[0];
     // N and w less the origin, and the corners of Q less it.
-    let value = |h: Homogeneous<3>| {
-        DVec3::from_array(h.weighted) - origin * h.weight
-    };
+    let value = |h: Homogeneous<3>| DVec3::from_array(h.weighted) - origin * h.weight;
     let [o, a, b, c] = corners.map(|v| v - origin);
     let weight = points.iter().fold(f64::INFINITY, |m, h| m.min(h.weight));
     let (fp, fq) = (as_f64(p + 1), as_f64(q + 1));

@@ -36,10 +36,10 @@ mod schema;
 mod set;
 mod shapes;
 mod solid;
-mod volume;
 #[cfg(test)]
 mod tests;
 mod value;
+mod volume;
 
 pub use build::Scene;
 pub use error::{InputProblem, Place, SceneError, Sources};
@@ -50,10 +50,10 @@ pub use limits::{
     MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
-    AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, PARAMETERS, CompressionName, CurveForm, CurveKind, CurveModel, FieldModel,
-    Fill, FormatName, PatchModel, SectionModel, VolumeModel, VolumeSource,
-    GridModel, GridStep, Operation, OutputModel, PlaceStep, PointModel, ProfileModel, SceneModel,
-    SolidKind, SolidModel, TurnModel, Units,
+    AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName, CurveForm,
+    CurveKind, CurveModel, FieldModel, Fill, FormatName, GridModel, GridStep, Operation,
+    OutputModel, PARAMETERS, PatchModel, PlaceStep, PointModel, ProfileModel, SceneModel,
+    SectionModel, SolidKind, SolidModel, TurnModel, Units, VolumeModel, VolumeSource,
 };
 pub use schema::json_schema;
 

@@ -13,7 +13,9 @@ use crate::error::Error;
 use crate::math::Similarity;
 use crate::math::bernstein;
 use crate::math::{Dd, Real};
-use crate::nurbs::{KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError};
+use crate::nurbs::{
+    KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError,
+};
 use crate::region::{Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, beziers};
 use crate::solid::{Body, Field, Part, Patches, Turn};
 use std::sync::Arc;
@@ -143,7 +145,9 @@ struct Maker<'a> {
 impl Maker<'_> {
     fn fault(&self, key: &str, found: String, wanted: &str, hint: Option<String>) -> Error {
         let path = format!("{}{key}", self.solid.path);
-        let error = self.model.error(self.solid.place, &path, Some(found), wanted, hint);
+        let error = self
+            .model
+            .error(self.solid.place, &path, Some(found), wanted, hint);
         error.into()
     }
 
@@ -156,7 +160,9 @@ impl Maker<'_> {
             volume_of(patch).map_err(|e| {
                 let path = format!("{}.patches[{index}]", self.solid.path);
                 let found = Some(e.to_string());
-                let error = self.model.error(patch.place, &path, found, "a NURBS volume", None);
+                let error = self
+                    .model
+                    .error(patch.place, &path, found, "a NURBS volume", None);
                 Error::from(error)
             })
         });
@@ -182,10 +188,10 @@ impl Maker<'_> {
 
     fn section(&self, section: &SectionModel, turn: TurnModel) -> Result<NurbsVolume, Error> {
         let made = || -> Result<NurbsVolume, ConstructError> {
-            let [u, v] = [0, 1].map(|k| KnotVector::new(section.degrees[k], section.knots[k].clone()));
+            let [u, v] =
+                [0, 1].map(|k| KnotVector::new(section.degrees[k], section.knots[k].clone()));
             let points = section.points.iter().map(|[r, z]| [*r, 0.0, *z]);
-            let surface =
-                NurbsSurface::new([u?, v?], points.collect(), section.weights.clone())?;
+            let surface = NurbsSurface::new([u?, v?], points.collect(), section.weights.clone())?;
             let turn = AngleInterval::new(turn.start, turn.angle)?;
             surface_circle(&surface, CircleForm::Quadratic, turn, &AxisFrame::WORLD)
         };
@@ -221,7 +227,11 @@ impl Maker<'_> {
             }
         }
         let rises: Vec<f64> = pieces.iter().map(Piece::rise).collect();
-        let first = rises.iter().copied().find(|r| *r != 0.0).unwrap_or_default();
+        let first = rises
+            .iter()
+            .copied()
+            .find(|r| *r != 0.0)
+            .unwrap_or_default();
         let reversal = rises.iter().position(|r| r * first < 0.0);
         if first < 0.0 && reversal.is_none() {
             pieces.reverse();
@@ -233,7 +243,8 @@ impl Maker<'_> {
     fn runs_back(&self, piece: usize) -> Error {
         let found = format!("a chain that runs back along the axis, at its monotone part {piece}");
         let wanted = "a chain along which z rises, or falls, all the way";
-        let hint = "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
+        let hint =
+            "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
         self.fault(".profile", found, wanted, Some(hint.to_owned()))
     }
 
@@ -285,7 +296,14 @@ impl Maker<'_> {
             });
             volumes.collect()
         };
-        made().map_err(|e| self.fault(".profile", e.to_string(), "a chain that can be turned", None))
+        made().map_err(|e| {
+            self.fault(
+                ".profile",
+                e.to_string(),
+                "a chain that can be turned",
+                None,
+            )
+        })
     }
 
     /// The union of the discs of a chain that runs back: every piece with the axis is a loop of one

@@ -236,7 +236,10 @@ fn output(value: &Value) -> Result<(OutputModel, Option<Names>), Fault> {
             return Err(Fault::value(value.place, wanted));
         }
         each(list, |_, value| {
-            Ok((string(value, "the name of a channel")?.to_owned(), value.place))
+            Ok((
+                string(value, "the name of a channel")?.to_owned(),
+                value.place,
+            ))
         })
     })?;
     if let Some(formats) =

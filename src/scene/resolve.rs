@@ -7,8 +7,9 @@
 use serde_json::{Map, Value, json};
 
 use super::model::{
-    AxisModel, CurveForm, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PlaceStep, PointModel,
-    ProfileModel, ReferenceModel, SceneModel, SolidKind, SolidModel, TurnModel, PatchModel, VolumeModel, VolumeSource,
+    AxisModel, CurveForm, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PatchModel,
+    PlaceStep, PointModel, ProfileModel, ReferenceModel, SceneModel, SolidKind, SolidModel,
+    TurnModel, VolumeModel, VolumeSource,
 };
 use crate::solid::Shape;
 

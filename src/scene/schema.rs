@@ -231,7 +231,10 @@ fn channel() -> Value {
     known["description"] = json!("A channel of every scene.");
     choice(
         "A channel.",
-        json!([known, name("A parameter u, v, w or a field of the scene's volumes.")]),
+        json!([
+            known,
+            name("A parameter u, v, w or a field of the scene's volumes.")
+        ]),
     )
 }
 
@@ -248,10 +251,7 @@ fn output() -> Value {
             (
                 "channels",
                 with_default(
-                    several(
-                        "What is sampled.",
-                        channel(),
-                    ),
+                    several("What is sampled.", channel()),
                     json!(["occupancy", "fraction", "sdf"]),
                 ),
             ),
@@ -668,12 +668,25 @@ fn net(description: &str, count: usize, fields: bool) -> Value {
     let knots = array("A knot vector.", 4, number("A knot."));
     let point = tuple("A control point.", count, number("A coordinate."));
     let mut properties = vec![
-        ("degrees", tuple("A degree for each parameter.", count, degree)),
-        ("knots", tuple("A knot vector for each parameter.", count, knots)),
-        ("points", array("Control points, the first index fastest.", 4, point)),
+        (
+            "degrees",
+            tuple("A degree for each parameter.", count, degree),
+        ),
+        (
+            "knots",
+            tuple("A knot vector for each parameter.", count, knots),
+        ),
+        (
+            "points",
+            array("Control points, the first index fastest.", 4, point),
+        ),
         (
             "weights",
-            array("A weight for each control point; by default 1.", 4, length("A weight.")),
+            array(
+                "A weight for each control point; by default 1.",
+                4,
+                length("A weight."),
+            ),
         ),
     ];
     if fields {

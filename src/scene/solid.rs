@@ -13,8 +13,8 @@ use super::model::{
     AxisModel, Operation, PlaceStep, ProfileModel, SolidKind, SolidModel, TurnModel,
 };
 use super::reference::shape;
-use super::volume::{Context, volume};
 use super::value::{Kind, Value};
+use super::volume::{Context, volume};
 
 /// Reads `solid`.
 pub(super) fn solids(value: &Value, context: &mut Context) -> Result<Vec<SolidModel>, Fault> {
@@ -106,7 +106,10 @@ fn solid(value: &Value, index: usize, context: &mut Context) -> Result<SolidMode
 }
 
 /// The index of the profile that a solid names.
-pub(super) fn profile(fields: &Fields, profiles: &[(String, ProfileModel)]) -> Result<usize, Fault> {
+pub(super) fn profile(
+    fields: &Fields,
+    profiles: &[(String, ProfileModel)],
+) -> Result<usize, Fault> {
     fields.need("profile", "the name of a profile", |value| {
         let wanted = "the name of a profile";
         let name = string(value, wanted)?;

@@ -2,7 +2,7 @@
 
 use super::error::{At, Fault, Sources};
 use super::fields::{
-    Fields, choice, each, elements, entries, finite, integer, number, string, tuple, vector, WEIGHT,
+    Fields, WEIGHT, choice, each, elements, entries, finite, integer, number, string, tuple, vector,
 };
 use super::keys;
 use super::limits::MAX_DEGREE;
@@ -75,8 +75,12 @@ pub(super) fn volume(
 
 fn only_with(fields: &Fields, key: &str, other: &str) -> Fault {
     let place = fields.get(key).map_or(fields.place(), |v| v.place);
-    Fault::found(place, format!("`{key}` without {other}"), format!("{other} beside it"))
-        .at_key(key)
+    Fault::found(
+        place,
+        format!("`{key}` without {other}"),
+        format!("{other} beside it"),
+    )
+    .at_key(key)
 }
 
 fn constructed(fields: &Fields, context: &Context) -> Result<VolumeSource, Fault> {
@@ -100,7 +104,11 @@ fn constructed(fields: &Fields, context: &Context) -> Result<VolumeSource, Fault
         });
     };
     if fields.get("section").is_some() {
-        return Err(only_with(fields, "section", "construct = \"surface-circle\""));
+        return Err(only_with(
+            fields,
+            "section",
+            "construct = \"surface-circle\"",
+        ));
     }
     let union = fields.read("fill", |value| choice(value, &[("union", ())]))?;
     Ok(VolumeSource::Curve {
@@ -161,11 +169,15 @@ fn net<const N: usize, const D: usize>(
         };
         Err(Fault::found(value.place, format!("{found} {what}"), wanted))
     };
-    let points = fields.need("points", "control points, the first index fastest", |value| {
-        let list = elements(value, "an array of control points")?;
-        count(value, list.len(), "control points")?;
-        each(list, |_, value| point(value))
-    })?;
+    let points = fields.need(
+        "points",
+        "control points, the first index fastest",
+        |value| {
+            let list = elements(value, "an array of control points")?;
+            count(value, list.len(), "control points")?;
+            each(list, |_, value| point(value))
+        },
+    )?;
     let weights = fields.read("weights", |value| {
         let list = elements(value, "an array of numbers")?;
         count(value, list.len(), "weights")?;
@@ -186,7 +198,13 @@ fn patch(value: &Value) -> Result<PatchModel, Fault> {
         let mut found: Vec<FieldModel> = Vec::new();
         for entry in entries(value, "a table of fields: a list of numbers for each")? {
             check_field_name(&entry.key)
-                .map_err(|wanted| Fault::found(entry.key_place, format!("a field named `{}`", entry.key), wanted))
+                .map_err(|wanted| {
+                    Fault::found(
+                        entry.key_place,
+                        format!("a field named `{}`", entry.key),
+                        wanted,
+                    )
+                })
                 .at_key(&entry.key)?;
             let list = elements(&entry.value, "an array of numbers").at_key(&entry.key)?;
             if list.len() != net.points.len() {

@@ -337,7 +337,7 @@ fn root(value: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         let (ra, rb) = ((a + 1.0).sqrt().recip(), (b + 1.0).sqrt().recip());
         let linear = low + (high - low) * ((1.0 - ra) / (rb - ra));
         let middle = if low > 0.0 && high > 4.0 * low {
-            (low * high).sqrt()
+            low.sqrt() * high.sqrt()
         } else {
             0.5 * (low + high)
         };
@@ -348,7 +348,10 @@ fn root(value: &impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         };
         for x in proposals {
             // A little to both sides, so that the bracket closes.
-            for x in [x * (1.0 - 4.0 * f64::EPSILON), x * (1.0 + 4.0 * f64::EPSILON)] {
+            for x in [
+                x * (1.0 - 4.0 * f64::EPSILON),
+                x * (1.0 + 4.0 * f64::EPSILON),
+            ] {
                 if x > low && x < high {
                     if value(x) >= 0.0 {
                         low = x;

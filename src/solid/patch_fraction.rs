@@ -155,9 +155,9 @@ impl Patches {
         let frame = self.frame();
         let local = frame.to_local(centre).point;
         // A box around the voxel in local coordinates.
-        let half = DVec3::from_array([0, 1, 2].map(|i| {
-            (frame.axis(i) * 0.5 * sides).abs().element_sum() / frame.scale()
-        })) * (1.0 + 1e-9);
+        let half = DVec3::from_array(
+            [0, 1, 2].map(|i| (frame.axis(i) * 0.5 * sides).abs().element_sum() / frame.scale()),
+        ) * (1.0 + 1e-9);
         let mut parts = Vec::new();
         // Every face is halved alike, so that neighbours meet at the same points.
         let depth = self.depth(half.max_element());
@@ -250,7 +250,8 @@ impl Part {
         let (mut lower, mut upper) = (self.points.clone(), self.points.clone());
         for row in 0..rows {
             let at = |i: usize| row * stride + i * step;
-            let mut work: SmallVec<[[f64; 4]; 8]> = (0..count).map(|i| self.points[at(i)]).collect();
+            let mut work: SmallVec<[[f64; 4]; 8]> =
+                (0..count).map(|i| self.points[at(i)]).collect();
             for level in (0..count).rev() {
                 lower[at(count - 1 - level)] = work[0];
                 upper[at(level)] = work[level];
@@ -293,7 +294,11 @@ impl Part {
             for i in 0..n {
                 let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
                 for t in [[a, b, c], [a, c, d]] {
-                    triangles.push(if self.outward > 0.0 { t } else { [t[0], t[2], t[1]] });
+                    triangles.push(if self.outward > 0.0 {
+                        t
+                    } else {
+                        [t[0], t[2], t[1]]
+                    });
                 }
             }
         }
@@ -393,7 +398,11 @@ fn along_edge(from: DVec3, to: DVec3) -> f64 {
     // Quadratic along the edge: Simpson's rule is exact.
     let sum = value(from) + 4.0 * value(0.5 * (from + to)) + value(to);
     let end = |p: DVec3| {
-        if p.x == 0.0 { -(1.0 - p.z).powi(3) / 6.0 } else { 0.0 }
+        if p.x == 0.0 {
+            -(1.0 - p.z).powi(3) / 6.0
+        } else {
+            0.0
+        }
     };
     // Where the boundary leaves the edge of the face an inside stretch of it ends, where it comes
     // to the edge one begins.

@@ -96,7 +96,9 @@ impl Patches {
         let cells = Cells::new(&volumes)?;
         let faces = FaceSet::new(&volumes)?;
         let around = faces.bounds();
-        let about = around.map_or(DVec3::ZERO, |b: Aabb| 0.5 * (b.min + b.max)).to_array();
+        let about = around
+            .map_or(DVec3::ZERO, |b: Aabb| 0.5 * (b.min + b.max))
+            .to_array();
         let mut moments = MapMoments::default();
         for volume in &volumes {
             add(&mut moments, &volume.moments_about(about)?);
@@ -197,7 +199,10 @@ impl Patches {
     pub(super) fn distance(&self, point: DVec3, _inside: bool, limit: f64) -> f64 {
         let scale = self.frame.scale();
         let limit_here = limit / scale;
-        let found = self.nets.faces.distance(self.frame.to_local(point).point, limit_here);
+        let found = self
+            .nets
+            .faces
+            .distance(self.frame.to_local(point).point, limit_here);
         if found < limit_here {
             found * scale
         } else {
@@ -226,8 +231,9 @@ impl Patches {
         for face in self.nets.faces.faces() {
             let points = face.surface.control_points().iter();
             let world = points.map(|h| self.frame.to_world(DVec3::from_array(h.to_point()))[axis]);
-            let (low, high) =
-                world.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+            let (low, high) = world.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(v), b.max(v))
+            });
             if high - low <= 1e-14 * self.bounds.longest_side() {
                 heights.push(0.5 * (low + high));
             }
@@ -309,7 +315,9 @@ impl Patches {
     pub(super) fn pace(&self, patch: Patch, t: f64) -> f64 {
         let face = &self.nets.faces.faces()[patch.number].surface;
         let along = [0.0, 0.5, 1.0].map(|v| {
-            let slopes = face.derivatives([t, v]).map(|d| DVec3::from_array(d.first[0]));
+            let slopes = face
+                .derivatives([t, v])
+                .map(|d| DVec3::from_array(d.first[0]));
             slopes.map_or(0.0, DVec3::length)
         });
         along.into_iter().fold(0.0, f64::max) * self.frame.scale()
@@ -434,10 +442,12 @@ impl FaceLine {
     pub(super) fn speed(&self) -> f64 {
         // |x'| <= p max |P_{j+1} - P_j| (w_max / w_min)²: G. Farin's bound for rational curves.
         let weights = self.points.iter().map(|h| h[3]);
-        let (low, high) =
-            weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
+        let (low, high) = weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
         let at = |h: &[f64; 4]| xyz(*h) / h[3];
-        let steps = self.points.windows(2).map(|w| (at(&w[1]) - at(&w[0])).length());
+        let steps = self
+            .points
+            .windows(2)
+            .map(|w| (at(&w[1]) - at(&w[0])).length());
         #[allow(clippy::cast_precision_loss, reason = "a degree")]
         let degree = (self.points.len() - 1) as f64;
         degree * steps.fold(0.0, f64::max) * (high / low).powi(2)
@@ -452,7 +462,10 @@ impl FaceLine {
     /// Length of the control polygon.
     fn length(&self) -> f64 {
         let at = |h: &[f64; 4]| xyz(*h) / h[3];
-        self.points.windows(2).map(|w| (at(&w[1]) - at(&w[0])).length()).sum()
+        self.points
+            .windows(2)
+            .map(|w| (at(&w[1]) - at(&w[0])).length())
+            .sum()
     }
 }
 
