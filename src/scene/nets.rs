@@ -176,6 +176,7 @@ impl Maker<'_> {
         };
         // A cell without volume adds nothing, and what could not be settled is not known to fold.
         match error {
+            OrientationError::Folded { .. } if fold_depth(volume) <= HAIR => Ok(()),
             OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
                 let key = format!(".patches[{index}]");
                 let wanted = "a Jacobian determinant of one sign";
@@ -342,6 +343,34 @@ impl Maker<'_> {
             frame,
             Turn::new(turn.start, turn.angle),
         ))
+    }
+}
+
+/// Folds whose determinant is below this share of the other sign's largest are those of rounded
+/// decimals, at rims and axes where it would be 0.
+const HAIR: f64 = 1e-5;
+
+/// The least determinant as a share of the largest one of the other sign, on a lattice over every
+/// cell with its corners: a fold of rounding is at a corner or an edge.
+fn fold_depth(volume: &NurbsVolume) -> f64 {
+    const PARTS: u32 = 8;
+    let (mut low, mut high) = (0.0_f64, 0.0_f64);
+    for piece in volume.to_bezier().unwrap_or_default() {
+        for n in 0..(PARTS + 1).pow(3) {
+            let place = |d: u32| f64::from(n / d % (PARTS + 1)) / f64::from(PARTS);
+            let at = [place(1), place(PARTS + 1), place((PARTS + 1).pow(2))];
+            let Ok(jacobian) = volume.jacobian(piece.parameters(at)) else {
+                return f64::INFINITY;
+            };
+            low = low.min(jacobian.determinant);
+            high = high.max(jacobian.determinant);
+        }
+    }
+    let share = low.abs().min(high) / low.abs().max(high);
+    if share.is_finite() {
+        share
+    } else {
+        f64::INFINITY
     }
 }
 

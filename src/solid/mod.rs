@@ -17,6 +17,7 @@ mod fraction;
 mod measure;
 mod part;
 mod patch_fraction;
+mod patch_voxel;
 mod patches;
 mod path;
 mod revolved;

@@ -1,4 +1,5 @@
-//! The share of a voxel that a solid of rational patches fills.
+//! The share of a voxel, less what half-spaces take, that a solid of rational patches fills. Whole voxels
+//! are those of [`patch_voxel`](super::patch_voxel).
 //!
 //! The voxel is cut in tetrahedra, each mapped to x, y, z >= 0, x + y + z <= 1. The divergence of
 //! (x, 0, 0) is 1 and its flux through three of the four faces is nothing, and so again in the
@@ -18,6 +19,7 @@
 //! * Error: the difference of the last two results, which is that of the coarser one.
 
 use super::fraction::SNAP;
+use super::patch_voxel::Cube;
 use super::patches::Patches;
 use crate::math::Side;
 use crate::math::tetrahedra::{HalfSpace, Tetrahedron, box_tetrahedra_within};
@@ -28,21 +30,25 @@ use smallvec::SmallVec;
 const FINEST: u32 = 7;
 
 /// A part of a face within reach of the voxel: homogeneous points from the voxel's centre, local.
-struct Part {
-    counts: [usize; 2],
-    points: Vec<[f64; 4]>,
-    outward: f64,
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    pub(super) counts: [usize; 2],
+    pub(super) points: Net,
+    /// +1 where X_u × X_v points out of the solid, else -1.
+    pub(super) outward: f64,
 }
+
+/// Control points of a patch.
+pub(super) type Net = SmallVec<[[f64; 4]; 16]>;
+/// Control points of a line on it.
+pub(super) type Line = SmallVec<[[f64; 4]; 8]>;
 
 /// A difference of two results, as a share of the voxel, below which the finer one is good: its own
 /// error is several times less.
-const AGREE: f64 = 3e-7;
+const AGREE: f64 = 1e-7;
 
 /// Halvings of a voxel that has no corner clear of the surface.
 const DEEPEST: u32 = 3;
-
-/// What is known of a corner: whether it is inside, and how far from the surface.
-type Known = SmallVec<[(DVec3, bool, f64); 8]>;
 
 impl Patches {
     pub(super) fn fraction_within(
@@ -71,8 +77,21 @@ impl Patches {
         agree: f64,
         depth: u32,
     ) -> f64 {
-        let mut tetrahedra = box_tetrahedra_within(0.5 * sides, spaces);
-        let Some(starts) = self.starts(&mut tetrahedra, sides, centre, depth) else {
+        let clear = if depth < DEEPEST {
+            0.02 * sides.min_element()
+        } else {
+            0.0
+        };
+        let (corner, distance) = self.clearest_corner(sides, centre, clear);
+        // All tetrahedra of a box share its first corner.
+        let mut tetrahedra = box_tetrahedra_within(-corner, spaces);
+        let starts = if distance < clear {
+            None
+        } else {
+            let first = self.side(centre + corner) != Side::Outside;
+            self.starts(&mut tetrahedra, (corner, first), centre, clear)
+        };
+        let Some(starts) = starts else {
             let eighths = (0..8_u32).map(|n| {
                 let side = |bit: u32| if n >> bit & 1 == 1 { 0.25 } else { -0.25 };
                 let by = sides * DVec3::new(side(0), side(1), side(2));
@@ -86,6 +105,10 @@ impl Patches {
             return eighths.sum::<f64>() / 8.0;
         };
         let parts = self.parts(sides, centre);
+        if spaces.is_empty() {
+            let first = starts.first().is_some_and(|s| *s);
+            return Cube::new(self.frame(), corner).share(&parts, first, agree);
+        }
         let volume = sides.element_product();
         let whole = |n: u32| -> f64 {
             let triangles = parts.iter().flat_map(|p| p.triangles(n, self.frame()));
@@ -110,42 +133,55 @@ impl Patches {
         settled.unwrap_or(last)
     }
 
-    /// Puts the corner of each tetrahedron that is furthest from the surface first, and tells whether
-    /// it is inside. On the surface itself a triangulation has no say, and faces that lie in those of
-    /// the tetrahedron must lie in the one opposite to the start. `None` where a tetrahedron has no
-    /// corner clear of the surface.
+    /// A corner of the voxel, from its centre, that is at least `clear` of the surface, or the one
+    /// that is furthest, and how far. On the surface itself a triangulation has no say, and faces
+    /// that lie in those of the tetrahedra must lie in those opposite to where these start.
+    fn clearest_corner(&self, sides: DVec3, centre: DVec3, clear: f64) -> (DVec3, f64) {
+        let away = self
+            .foot(centre, true)
+            .map_or(DVec3::X, |foot| centre - foot);
+        let mut corners: SmallVec<[DVec3; 8]> = (0..8_u32)
+            .map(|n| {
+                let side = |bit: u32| if n >> bit & 1 == 1 { 0.5 } else { -0.5 };
+                sides * DVec3::new(side(0), side(1), side(2))
+            })
+            .collect();
+        // Seen from the nearest point of the surface, the furthest first.
+        corners.sort_by(|a, b| b.dot(away).total_cmp(&a.dot(away)));
+        let mut best = (corners[0], -1.0);
+        for corner in corners {
+            let distance = self.distance(centre + corner, true, f64::INFINITY);
+            if distance > best.1 {
+                best = (corner, distance);
+            }
+            if distance >= clear {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Whether the first corners of the tetrahedra are inside, with corners put first that are `clear`
+    /// of the surface; `None` where there is none.
     fn starts(
         &self,
         tetrahedra: &mut [Tetrahedron],
-        sides: DVec3,
+        (corner, inside): (DVec3, bool),
         centre: DVec3,
-        depth: u32,
+        clear: f64,
     ) -> Option<SmallVec<[bool; 32]>> {
-        let clear = 0.02 * sides.min_element();
-        let mut known = Known::new();
         let mut starts = SmallVec::new();
         for tetrahedron in tetrahedra {
-            let mut best: Option<(usize, bool, f64)> = None;
-            for k in 0..4 {
-                let corner = tetrahedron[k];
-                let found = known.iter().find(|(c, ..)| *c == corner).copied();
-                let (_, inside, distance) = found.unwrap_or_else(|| {
-                    let point = centre + corner;
-                    let inside = self.side(point) != Side::Outside;
-                    let one = (corner, inside, self.distance(point, inside, f64::INFINITY));
-                    known.push(one);
-                    one
-                });
-                if best.is_none_or(|(.., most)| distance > most) {
-                    best = Some((k, inside, distance));
-                }
+            if let Some(k) = (0..4).find(|&k| tetrahedron[k] == corner) {
+                tetrahedron.swap(0, k);
+                starts.push(inside);
+                continue;
             }
-            let (k, inside, distance) = best?;
-            if distance < clear && depth < DEEPEST {
-                return None;
-            }
+            // Half-spaces have cut the corner off.
+            let distance = |k: usize| self.distance(centre + tetrahedron[k], true, f64::INFINITY);
+            let k = (0..4).find(|&k| distance(k) >= clear)?;
             tetrahedron.swap(0, k);
-            starts.push(inside);
+            starts.push(self.side(centre + tetrahedron[0]) != Side::Outside);
         }
         Some(starts)
     }
@@ -163,7 +199,7 @@ impl Patches {
         let depth = self.depth(half.max_element());
         for face in self.faces().faces() {
             let points = face.surface.control_points().iter();
-            let points: Vec<[f64; 4]> = points
+            let points: Net = points
                 .map(|h| {
                     let w = h.weight;
                     let d: [f64; 3] = std::array::from_fn(|k| h.weighted[k] - w * local[k]);
@@ -240,7 +276,7 @@ impl Part {
         }
     }
 
-    fn halves(&self, direction: usize) -> [Self; 2] {
+    pub(super) fn halves(&self, direction: usize) -> [Self; 2] {
         let [n, m] = self.counts;
         let (count, rows, step, stride) = if direction == 0 {
             (n, m, 1, n)
@@ -316,7 +352,7 @@ fn reduced(mut row: SmallVec<[[f64; 4]; 8]>, t: f64) -> [f64; 4] {
     row[0]
 }
 
-type Polygon = SmallVec<[DVec3; 8]>;
+pub(super) type Polygon = SmallVec<[DVec3; 8]>;
 
 /// The sums of the surface's part: everything but the edge's end.
 #[derive(Debug, Default)]
@@ -365,7 +401,11 @@ impl Flux {
 }
 
 /// What a clip by `height >= 0` leaves; points on it are put there.
-fn clipped(polygon: &Polygon, height: impl Fn(DVec3) -> f64, put: impl Fn(&mut DVec3)) -> Polygon {
+pub(super) fn clipped(
+    polygon: &Polygon,
+    height: impl Fn(DVec3) -> f64,
+    put: impl Fn(&mut DVec3),
+) -> Polygon {
     let mut left = Polygon::new();
     for (i, &a) in polygon.iter().enumerate() {
         let b = polygon[(i + 1) % polygon.len()];
@@ -383,7 +423,7 @@ fn clipped(polygon: &Polygon, height: impl Fn(DVec3) -> f64, put: impl Fn(&mut D
 }
 
 /// ∬ x n_x dA over a planar polygon.
-fn flux_of_x(polygon: &Polygon) -> f64 {
+pub(super) fn flux_of_x(polygon: &Polygon) -> f64 {
     let mut sum = 0.0;
     for i in 2..polygon.len() {
         let [a, b, c] = [polygon[0], polygon[i - 1], polygon[i]];
