@@ -352,7 +352,7 @@ fn reduced(mut row: SmallVec<[[f64; 4]; 8]>, t: f64) -> [f64; 4] {
     row[0]
 }
 
-pub(super) type Polygon = SmallVec<[DVec3; 8]>;
+type Polygon = SmallVec<[DVec3; 8]>;
 
 /// The sums of the surface's part: everything but the edge's end.
 #[derive(Debug, Default)]
@@ -401,11 +401,7 @@ impl Flux {
 }
 
 /// What a clip by `height >= 0` leaves; points on it are put there.
-pub(super) fn clipped(
-    polygon: &Polygon,
-    height: impl Fn(DVec3) -> f64,
-    put: impl Fn(&mut DVec3),
-) -> Polygon {
+fn clipped(polygon: &Polygon, height: impl Fn(DVec3) -> f64, put: impl Fn(&mut DVec3)) -> Polygon {
     let mut left = Polygon::new();
     for (i, &a) in polygon.iter().enumerate() {
         let b = polygon[(i + 1) % polygon.len()];
@@ -423,7 +419,7 @@ pub(super) fn clipped(
 }
 
 /// ∬ x n_x dA over a planar polygon.
-pub(super) fn flux_of_x(polygon: &Polygon) -> f64 {
+fn flux_of_x(polygon: &Polygon) -> f64 {
     let mut sum = 0.0;
     for i in 2..polygon.len() {
         let [a, b, c] = [polygon[0], polygon[i - 1], polygon[i]];

@@ -14,12 +14,12 @@
 //!
 //! * Error: the difference of the last two results, which is that of the coarser one.
 
-use super::patch_fraction::{Line, Part, Polygon, clipped, flux_of_x};
+use super::patch_fraction::{Line, Part};
 use crate::math::Similarity;
 use glam::DVec3;
 
 /// Levels below that at which a patch is about as large as the voxel.
-const COARSEST: usize = 3;
+const COARSEST: usize = 4;
 const FINEST: usize = 9;
 
 /// Nodes and weights of Gauss's rules on [0, 1].
@@ -135,19 +135,35 @@ impl Sums {
         match place(part) {
             Place::Beyond => {}
             Place::Within => self.within[level] += part.outward * rules.flux(part, level),
+            Place::Cut if level + 2 == self.cut.len() - 1 => self.leaf(part, rules, level),
             Place::Cut => {
-                let finest = self.cut.len() - 1;
-                if level + 2 >= finest {
-                    self.cut[level] += triangles(part);
-                }
-                if level < finest {
-                    for half in part.halves(0) {
-                        for quarter in half.halves(1) {
-                            self.visit(&quarter, rules, level + 1);
-                        }
+                for half in part.halves(0) {
+                    for quarter in half.halves(1) {
+                        self.visit(&quarter, rules, level + 1);
                     }
                 }
             }
+        }
+    }
+
+    /// The triangles of the last three levels, on points of the finest.
+    fn leaf(&mut self, part: &Part, rules: &Rules, level: usize) {
+        let grid = rules.points(part);
+        let at = |i: usize, j: usize| grid[j][i];
+        for (more, step) in [4, 2, 1].into_iter().enumerate() {
+            let mut sum = 0.0;
+            for j in (0..4).step_by(step) {
+                for i in (0..4).step_by(step) {
+                    let (k, l) = (i + step, j + step);
+                    let [a, b, c, d] = [at(i, j), at(k, j), at(k, l), at(i, l)];
+                    if part.outward > 0.0 {
+                        sum += clip([a, b, c]) + clip([a, c, d]);
+                    } else {
+                        sum += clip([a, c, b]) + clip([a, d, c]);
+                    }
+                }
+            }
+            self.cut[level + more] += sum;
         }
     }
 }
@@ -214,6 +230,8 @@ struct Rules {
     counts: [usize; 2],
     /// With 6, 3 and 2 points, in both directions.
     bases: [[Basis; 2]; 3],
+    /// At quarters.
+    quarters: [Basis; 2],
 }
 
 impl Rules {
@@ -222,7 +240,38 @@ impl Rules {
         Self {
             counts,
             bases: [both(&GAUSS_6), both(&GAUSS_3), both(&GAUSS_2)],
+            quarters: both(&[0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (t, 0.0))),
         }
+    }
+
+    /// Points at quarters of both parameters, the first within the rows.
+    fn points(&self, part: &Part) -> [[DVec3; 5]; 5] {
+        let [first, second] = &self.quarters;
+        let columns = self.counts[0];
+        let mut line = Line::from_elem([0.0; 4], columns);
+        let mut grid = [[DVec3::ZERO; 5]; 5];
+        for (row, values) in grid.iter_mut().zip(&second.values) {
+            for i in 0..columns {
+                let mut value = [0.0; 4];
+                for (j, b) in values.iter().enumerate() {
+                    let h = part.points[j * columns + i];
+                    for c in 0..4 {
+                        value[c] += b * h[c];
+                    }
+                }
+                line[i] = value;
+            }
+            for (place, values) in row.iter_mut().zip(&first.values) {
+                let mut h = [0.0; 4];
+                for (b, p) in values.iter().zip(&line) {
+                    for c in 0..4 {
+                        h[c] += b * p[c];
+                    }
+                }
+                *place = DVec3::new(h[0], h[1], h[2]) / h[3];
+            }
+        }
+        grid
     }
 
     /// ∬ x (X_u × X_v)_x du dv over a patch found at a level: where it is as large as the voxel it is
@@ -291,41 +340,85 @@ impl Rules {
     }
 }
 
-/// The sums of a patch's two triangles, clipped.
-fn triangles(part: &Part) -> f64 {
-    let [n, m] = part.counts;
-    let at = |i: usize, j: usize| {
-        let h = part.points[j * n + i];
-        DVec3::new(h[0], h[1], h[2]) / h[3]
-    };
-    let [a, b, c, d] = [at(0, 0), at(n - 1, 0), at(n - 1, m - 1), at(0, m - 1)];
-    let one = |t: [DVec3; 3]| {
-        if part.outward > 0.0 {
-            clip(t)
-        } else {
-            clip([t[0], t[2], t[1]])
-        }
-    };
-    one([a, b, c]) + one([a, c, d])
+/// A polygon while it is clipped: a triangle has at most three and six corners more.
+struct Clipped {
+    corners: [DVec3; 9],
+    count: usize,
 }
 
+impl Clipped {
+    fn push(&mut self, p: DVec3) {
+        if let Some(place) = self.corners.get_mut(self.count) {
+            *place = p;
+            self.count += 1;
+        }
+    }
+
+    /// What is left where `height` is not negative; points on that plane are put there.
+    fn cut(&self, height: impl Fn(DVec3) -> f64, put: impl Fn(&mut DVec3)) -> Self {
+        let mut left = Self {
+            corners: self.corners,
+            count: 0,
+        };
+        let corners = &self.corners[..self.count];
+        for (i, &a) in corners.iter().enumerate() {
+            let b = corners[if i + 1 == corners.len() { 0 } else { i + 1 }];
+            let (ha, hb) = (height(a), height(b));
+            if ha >= 0.0 {
+                left.push(a);
+            }
+            if (ha >= 0.0) != (hb >= 0.0) {
+                let mut at = a + (b - a) * (ha / (ha - hb));
+                put(&mut at);
+                left.push(at);
+            }
+        }
+        left
+    }
+}
+
+/// ∬ x n_x dA over a triangle.
+fn triangle_flux([a, b, c]: [DVec3; 3]) -> f64 {
+    let (u, v) = (b - a, c - a);
+    (a.x + b.x + c.x) / 6.0 * (u.y * v.z - u.z * v.y)
+}
+
+/// The sums of a triangle, clipped.
 fn clip(triangle: [DVec3; 3]) -> f64 {
-    let mut polygon: Polygon = triangle.into_iter().collect();
+    let [a, b, c] = triangle;
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    if high.cmplt(DVec3::ZERO).any() || low.cmpgt(DVec3::ONE).any() {
+        return 0.0;
+    }
+    if low.cmpge(DVec3::ZERO).all() && high.cmple(DVec3::ONE).all() {
+        return triangle_flux(triangle);
+    }
+    let mut polygon = Clipped {
+        corners: [a; 9],
+        count: 0,
+    };
+    polygon.push(a);
+    polygon.push(b);
+    polygon.push(c);
     for axis in 0..3 {
-        if polygon.iter().any(|p| p[axis] < 0.0) {
-            polygon = clipped(&polygon, |p| p[axis], |p| p[axis] = 0.0);
+        if low[axis] < 0.0 {
+            polygon = polygon.cut(|p| p[axis], |p| p[axis] = 0.0);
         }
     }
     for axis in [1, 2] {
-        if polygon.iter().any(|p| p[axis] > 1.0) {
-            polygon = clipped(&polygon, |p| 1.0 - p[axis], |p| p[axis] = 1.0);
+        if high[axis] > 1.0 {
+            polygon = polygon.cut(|p| 1.0 - p[axis], |p| p[axis] = 1.0);
         }
     }
     // The last cut leaves one edge in the face x = 1.
     let (mut from, mut to) = (None, None);
-    let mut left = Polygon::new();
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
+    let mut left = Clipped {
+        corners: [a; 9],
+        count: 0,
+    };
+    let corners = &polygon.corners[..polygon.count];
+    for (i, &a) in corners.iter().enumerate() {
+        let b = corners[if i + 1 == corners.len() { 0 } else { i + 1 }];
         let (da, db) = (1.0 - a.x, 1.0 - b.x);
         if da >= 0.0 {
             left.push(a);
@@ -341,7 +434,10 @@ fn clip(triangle: [DVec3; 3]) -> f64 {
             }
         }
     }
-    let mut sum = flux_of_x(&left);
+    let mut sum = 0.0;
+    for i in 2..left.count {
+        sum += triangle_flux([left.corners[0], left.corners[i - 1], left.corners[i]]);
+    }
     if let (Some(from), Some(to)) = (from, to) {
         // The solid in the face has the edge the other way round: from `to` to `from`.
         sum += 0.5 * (from.y + to.y) * (from.z - to.z);
