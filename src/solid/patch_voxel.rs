@@ -23,10 +23,6 @@ const COARSEST: usize = 4;
 const FINEST: usize = 9;
 
 /// Nodes and weights of Gauss's rules on [0, 1].
-const GAUSS_2: [(f64, f64); 2] = [
-    (0.211_324_865_405_187_1, 0.5),
-    (0.788_675_134_594_812_9, 0.5),
-];
 const GAUSS_3: [(f64, f64); 3] = [
     (0.112_701_665_379_258_31, 0.277_777_777_777_777_8),
     (0.5, 0.444_444_444_444_444_4),
@@ -228,8 +224,8 @@ impl Basis {
 /// Gauss's rules for patches of one pair of degrees.
 struct Rules {
     counts: [usize; 2],
-    /// With 6, 3 and 2 points, in both directions.
-    bases: [[Basis; 2]; 3],
+    /// With 6 and with 3 points, in both directions.
+    bases: [[Basis; 2]; 2],
     /// At quarters.
     quarters: [Basis; 2],
 }
@@ -239,7 +235,7 @@ impl Rules {
         let both = |rule: &[(f64, f64)]| counts.map(|n| Basis::new(rule, n - 1));
         Self {
             counts,
-            bases: [both(&GAUSS_6), both(&GAUSS_3), both(&GAUSS_2)],
+            bases: [both(&GAUSS_6), both(&GAUSS_3)],
             quarters: both(&[0.0, 0.25, 0.5, 0.75, 1.0].map(|t| (t, 0.0))),
         }
     }
@@ -278,9 +274,9 @@ impl Rules {
     /// halved until two results agree, where it is small fewer points are as good.
     fn flux(&self, part: &Part, level: usize) -> f64 {
         match level {
-            0 | 1 => self.adaptive(part, 0),
-            2 | 3 => self.gauss(part, 1),
-            _ => self.gauss(part, 2),
+            0..=2 => self.adaptive(part, 0),
+            3 | 4 => self.gauss(part, 0),
+            _ => self.gauss(part, 1),
         }
     }
 
