@@ -82,6 +82,8 @@ pub(super) enum Command {
     Converge(Converge),
     /// Write the tessellated boundary: .stl, .obj or .ply
     Mesh(Mesh),
+    /// Write the solids as exact NURBS volumes: .g2, .mesh (MFEM), .json (geomdl) or .xml (G+Smo)
+    Export(Export),
     /// Draw the solid, shaded or as a section with distance isolines
     Render(Render),
     /// Show what a finished stack holds, and verify its digests
@@ -288,6 +290,26 @@ pub(super) struct Mesh {
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
+Every kind of solid can be written but some that are revolved: their profile must be one chain to the axis along which z
+never turns back. The file holds all patches of all solids in order, placed; what is subtracted or intersected can only be
+written by itself, with --solid. Solids that overlap are written whole, so a reader of the file counts what they share
+twice. A scene reads it back as kind = \"volume\", file = \"FILE\".
+
+Example: voxlathe export scenes/cylinder.toml -o cylinder.g2")]
+pub(super) struct Export {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// File to write, .g2 (GoTools), .mesh (MFEM), .json (geomdl) or .xml (G+Smo)
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Write only the solid of this name
+    #[arg(long, value_name = "NAME")]
+    pub(super) solid: Option<String>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
 Both kinds are drawn from the exact distance, not from voxels or a mesh. The shaded picture is orthographic with +z up,
 so its scale bar holds everywhere; a section is to scale.
 
@@ -331,6 +353,10 @@ pub(super) struct Render {
         requires = "slice"
     )]
     pub(super) isolines: Option<f64>,
+    /// Parameter lines between knots on the faces of volumes, 0 for none, 4 without it; those at the
+    /// knots are stronger
+    #[arg(long, value_name = "N", conflicts_with = "slice")]
+    pub(super) lines: Option<usize>,
     /// Leave out scale bar, axes, names and colour bar
     #[arg(long)]
     pub(super) plain: bool,

@@ -4,6 +4,7 @@
 
 mod arguments;
 mod converge;
+mod export;
 mod failure;
 mod generate;
 mod info;
@@ -67,6 +68,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Validate(a) => validate::run(a, common, console),
         Command::Converge(a) => converge::run(a, common, console),
         Command::Mesh(a) => mesh::run(a, common, console),
+        Command::Export(a) => export::run(a, common, console),
         Command::Render(a) => render::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),

@@ -6,7 +6,7 @@ use super::interrupt;
 use super::output::{self, Console, NOTHING_LEFT};
 use crate::io::write_file_atomically;
 use crate::picture::{
-    Cut, Plane, RenderOptions, SectionOptions, View, render as picture_of, section,
+    Cut, MAX_LINES, Plane, RenderOptions, SectionOptions, View, render as picture_of, section,
 };
 use crate::scene::Scene;
 use serde_json::json;
@@ -35,6 +35,12 @@ pub(super) fn run(
             )));
         }
     };
+    let lines = arguments.lines.unwrap_or(default.lines);
+    if lines > MAX_LINES {
+        return Err(Failure::usage(format!(
+            "--lines: {lines} is more than {MAX_LINES}"
+        )));
+    }
     let scene = Scene::load_with(&arguments.scene, &common.set)?;
     let mut warnings = scene.warnings().to_vec();
     if scene.assembly().is_empty() || scene.exact_volume() == Some(0.0) {
@@ -72,6 +78,7 @@ pub(super) fn run(
                     CutKind::Half => Cut::Half,
                 }),
                 annotations: !arguments.plain,
+                lines,
             };
             picture_of(&scene, &options, &interrupted)?
         }
@@ -95,6 +102,7 @@ pub(super) fn run(
         "cut": arguments.cut.map(CutKind::name),
         "slice": plane.map(|p| json!({ "axis": p.axis().name().to_string(), "value": p.value() })),
         "isolines": arguments.isolines,
+        "lines": plane.is_none().then_some(lines),
         "seconds": seconds,
         "warnings": warnings,
     });

@@ -119,6 +119,17 @@ impl Camera {
             + self.up * ((0.5 * self.size[1] - y) * self.scale)
     }
 
+    /// Where a point is seen, in pixels from the upper left corner, and how far behind the picture's
+    /// plane it is, in scene units.
+    pub(super) fn project(&self, p: DVec3) -> [f64; 3] {
+        let d = p - self.centre;
+        [
+            0.5 * self.size[0] + d.dot(self.right) / self.scale,
+            0.5 * self.size[1] - d.dot(self.up) / self.scale,
+            d.dot(self.forward),
+        ]
+    }
+
     /// The same camera whose picture has a part of this one, a box in pixels, in its middle.
     pub(super) fn framed(&self, low: [f64; 2], high: [f64; 2], room: [f64; 2]) -> Self {
         let middle = self.point(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]));
@@ -173,6 +184,8 @@ mod tests {
         let camera = Camera::new(view, DVec3::new(1.0, 2.0, 3.0), 0.5, [8.0, 6.0]);
         assert!((camera.point(4.0, 3.0) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
         assert!((camera.point(8.0, 0.0) - DVec3::new(3.0, 2.0, 4.5)).length() < 1e-12);
+        let [x, y, depth] = camera.project(camera.point(7.0, 1.5) + camera.forward * 2.5);
+        assert!((x - 7.0).abs() + (y - 1.5).abs() + (depth - 2.5).abs() < 1e-12);
         let part = camera.framed([4.0, 0.0], [8.0, 3.0], [8.0, 6.0]);
         assert!((part.point(8.0, 0.0) - camera.point(8.0, 0.0)).length() < 1e-12);
         assert!((part.point(0.0, 6.0) - camera.point(4.0, 3.0)).length() < 1e-12);

@@ -24,6 +24,14 @@ pub enum PictureError {
         /// The most that is allowed.
         most: usize,
     },
+    /// There would be too many parameter lines.
+    #[error("{found} lines between two knots are more than {most}")]
+    Lines {
+        /// The value given.
+        found: usize,
+        /// The most that is allowed.
+        most: usize,
+    },
     /// An angle of view is not a number of degrees.
     #[error("{angle} {found} is not {wanted}")]
     Angle {

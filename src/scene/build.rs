@@ -5,10 +5,11 @@ use super::model::{
     self, AxisModel, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel,
     SolidKind, SolidModel, TurnModel,
 };
-use super::{nets, shapes};
+use super::{export, nets, shapes};
 use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
+use crate::nurbs::NurbsVolume;
 use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region, RegionError};
 use crate::solid::{
     Analytic, Assembly, Block, Body, Ellipsoid, Measures, Operation, Part, Shape, Turn,
@@ -216,6 +217,50 @@ impl Scene {
     #[must_use]
     pub fn measures(&self) -> Option<Measures> {
         self.assembly.measures()
+    }
+
+    /// A solid as trivariate NURBS whose images make it up, in scene coordinates.
+    ///
+    /// Volumes have their own, rounded once into their place. Cylinder, cone, sphere, torus, ellipsoid
+    /// and box have an exact form, and so has what is revolved from one chain to the axis along which z
+    /// never turns back.
+    ///
+    /// * `index`: that of the solid in [`SceneModel::solids`].
+    ///
+    /// # Errors
+    /// [`Error::Scene`] when the solid has no such form, or there is no such solid.
+    ///
+    /// ```
+    /// let scene = voxlathe::Scene::parse(r#"
+    ///     schema = 1
+    ///     [[solid]]
+    ///     kind = "torus"
+    ///     major = 3
+    ///     minor = 1
+    ///     place = [{ translate = [0, 0, 5] }]
+    /// "#)?;
+    /// let volumes = scene.volumes(0)?;
+    /// assert_eq!(volumes[0].degrees(), [2, 2, 2]);
+    /// let [x, y, z] = volumes[0].evaluate([0.5, 0.5, 0.25])?; // the middle of the tube, a quarter round
+    /// assert!(x.abs() + (y - 3.0).abs() + (z - 5.0).abs() < 1e-14);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn volumes(&self, index: usize) -> Result<Vec<NurbsVolume>, Error> {
+        let solid = self.model.solids.get(index);
+        let Some((solid, part)) = solid.zip(self.assembly.parts().get(index)) else {
+            let place = self
+                .model
+                .solids
+                .first()
+                .map_or(self.model.grid.place, |s| s.place);
+            let found = Some(format!("no solid of index {index}"));
+            let wanted = format!("an index below {}", self.model.solids.len());
+            return Err(self
+                .model
+                .error(place, "solid", found, &wanted, None)
+                .into());
+        };
+        export::volumes(&self.model, solid, part.body())
     }
 
     /// BLAKE3 of the resolved scene, in hexadecimal.

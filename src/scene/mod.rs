@@ -21,6 +21,7 @@ use std::path::Path;
 
 mod build;
 mod error;
+mod export;
 mod fields;
 mod json;
 mod keys;

@@ -40,7 +40,8 @@ pub(super) fn part(
             let chain = maker.chain(&model.profiles[*profile].1)?;
             if let Some(back) = chain.reversal {
                 if !*union {
-                    return Err(maker.runs_back(back));
+                    let hint = "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
+                    return Err(maker.runs_back(back, hint));
                 }
                 return maker.stack(&frame, &chain, *turn);
             }
@@ -61,6 +62,22 @@ pub(super) fn part(
         solid.material,
         Body::Patches(body),
     ))
+}
+
+/// The volumes that a turned profile is, where it is one chain to the axis along which z never turns
+/// back.
+pub(super) fn revolved(
+    model: &SceneModel,
+    solid: &SolidModel,
+    profile: usize,
+    turn: TurnModel,
+) -> Result<Vec<NurbsVolume>, Error> {
+    let maker = Maker { model, solid };
+    let chain = maker.chain(&model.profiles[profile].1)?;
+    if let Some(back) = chain.reversal {
+        return Err(maker.runs_back(back, "`mesh` writes the boundary of every solid"));
+    }
+    maker.curve(CurveForm::Disc, chain, turn)
 }
 
 /// The fields of patches, all of which have the same.
@@ -241,11 +258,9 @@ impl Maker<'_> {
         Ok(Chain { pieces, reversal })
     }
 
-    fn runs_back(&self, piece: usize) -> Error {
+    fn runs_back(&self, piece: usize, hint: &str) -> Error {
         let found = format!("a chain that runs back along the axis, at its monotone part {piece}");
         let wanted = "a chain along which z rises, or falls, all the way";
-        let hint =
-            "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
         self.fault(".profile", found, wanted, Some(hint.to_owned()))
     }
 
@@ -260,7 +275,8 @@ impl Maker<'_> {
         let mut runs: Vec<Vec<Piece>> = Vec::new();
         let mut broken = true;
         for piece in chain.pieces {
-            if piece.rise() == 0.0 {
+            // What is level or on the axis has nothing beneath it.
+            if piece.rise() == 0.0 || piece.points.iter().all(|p| p[0] == Dd::ZERO) {
                 broken = true;
                 continue;
             }
