@@ -31,11 +31,16 @@ fn bowl() -> Vec<NurbsVolume> {
     let volume = |section: &[Vec<Point>; 2]| {
         let degree = section[0].len() - 1;
         let knots = [degree, 1].map(|d| KnotVector::bezier(d).expect("a degree"));
-        let points: Vec<[f64; 3]> = section.iter().flatten().map(|[r, z]| [*r, 0.0, *z]).collect();
+        let points: Vec<[f64; 3]> = section
+            .iter()
+            .flatten()
+            .map(|[r, z]| [*r, 0.0, *z])
+            .collect();
         let weights = vec![1.0; points.len()];
         let surface = NurbsSurface::new(knots, points, weights).expect("a surface");
         let world = &AxisFrame::WORLD;
-        surface_circle(&surface, CircleForm::Quadratic, AngleInterval::FULL, world).expect("a volume")
+        surface_circle(&surface, CircleForm::Quadratic, AngleInterval::FULL, world)
+            .expect("a volume")
     };
     sections().iter().map(volume).collect()
 }
@@ -44,7 +49,10 @@ fn bowl() -> Vec<NurbsVolume> {
 fn the_bowl_s_file_is_what_the_writer_writes() {
     let text = write_text(Format::G2, &bowl()).expect("a text");
     let found = std::fs::read_to_string(BOWL).expect("the file");
-    assert!(text == found, "{BOWL} is not what the construction gives; make it anew");
+    assert!(
+        text == found,
+        "{BOWL} is not what the construction gives; make it anew"
+    );
 }
 
 #[test]
@@ -71,7 +79,11 @@ fn integral(n: usize, f: impl Fn(f64) -> f64) -> f64 {
 
 /// A rational Bézier combination of values at `t`.
 fn bezier(values: &[f64], weights: &[f64], t: f64) -> f64 {
-    let mut a: Vec<[f64; 2]> = values.iter().zip(weights).map(|(v, w)| [v * w, *w]).collect();
+    let mut a: Vec<[f64; 2]> = values
+        .iter()
+        .zip(weights)
+        .map(|(v, w)| [v * w, *w])
+        .collect();
     for n in (1..a.len()).rev() {
         for i in 0..n {
             a[i] = [0, 1].map(|k| (1.0 - t) * a[i][k] + t * a[i + 1][k]);
@@ -83,9 +95,8 @@ fn bezier(values: &[f64], weights: &[f64], t: f64) -> f64 {
 /// π ∫ r² dz along a curve, the derivative by central differences of fourth order.
 fn turned(r: impl Fn(f64) -> f64, z: impl Fn(f64) -> f64) -> f64 {
     let h = 1e-3;
-    let slope = |t: f64| {
-        (8.0 * (z(t + h) - z(t - h)) - (z(t + 2.0 * h) - z(t - 2.0 * h))) / (12.0 * h)
-    };
+    let slope =
+        |t: f64| (8.0 * (z(t + h) - z(t - h)) - (z(t + 2.0 * h) - z(t - 2.0 * h))) / (12.0 * h);
     PI * integral(40, |t| r(t).powi(2) * slope(t))
 }
 
@@ -165,16 +176,20 @@ fn the_buoy_is_the_outline_of_its_parts() {
         if z <= low || z >= high {
             break;
         }
-        *(if tower(z) > lamp(z) { &mut low } else { &mut high }) = z;
+        *(if tower(z) > lamp(z) {
+            &mut low
+        } else {
+            &mut high
+        }) = z;
     }
-    let segment = |a: f64, b: f64, r: &dyn Fn(f64) -> f64| turned(|t| r(a + t * (b - a)), |t| a + t * (b - a));
+    let segment = |a: f64, b: f64, r: &dyn Fn(f64) -> f64| {
+        turned(|t| r(a + t * (b - a)), |t| a + t * (b - a))
+    };
     // The fender, half outside: the half disc about the axis, 2π r̄ A of its moment.
     let fender = PI * PI * 0.04 * 1.2 + 4.0 / 3.0 * PI * 0.008;
     let cap = 3.4 - low;
-    let wanted = PI * 1.44 * 0.9
-        + fender
-        + segment(0.9, low, &tower)
-        + PI * cap * cap * (0.3 - cap / 3.0);
+    let wanted =
+        PI * 1.44 * 0.9 + fender + segment(0.9, low, &tower) + PI * cap * cap * (0.3 - cap / 3.0);
     check("buoy", wanted, 1e-12);
 }
 
@@ -197,9 +212,12 @@ fn the_graded_block_is_the_integral_of_its_determinants() {
     let value: toml::Table = text.parse().expect("toml");
     let patches = value["solid"][0]["patches"].as_array().expect("patches");
     let number = |v: &toml::Value| {
-        v.as_float().unwrap_or_else(|| v.as_integer().map_or(f64::NAN, |i| i as f64))
+        v.as_float()
+            .unwrap_or_else(|| v.as_integer().map_or(f64::NAN, |i| i as f64))
     };
-    let list = |v: &toml::Value| -> Vec<f64> { v.as_array().expect("a list").iter().map(number).collect() };
+    let list = |v: &toml::Value| -> Vec<f64> {
+        v.as_array().expect("a list").iter().map(number).collect()
+    };
     let volumes = patches.iter().map(|patch| {
         let points: Vec<[f64; 3]> = (patch["points"].as_array().expect("points").iter())
             .map(|p| list(p).try_into().expect("three"))

@@ -319,7 +319,9 @@ pub(crate) fn shipped() -> Vec<(String, Scene)> {
         })
         .filter(|(_, scene)| {
             let solids = &scene.model().solids;
-            solids.iter().all(|s| matches!(s.kind, SolidKind::Revolve { .. }))
+            solids
+                .iter()
+                .all(|s| matches!(s.kind, SolidKind::Revolve { .. }))
         })
         .collect()
 }
