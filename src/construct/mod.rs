@@ -73,7 +73,8 @@
 //! Constructions a and c fill the space between curve and axis where z is monotone along the curve, which
 //! [`z_course`] certifies; elsewhere the map folds, its signed volume is still π ∫ r² dz, and the union of its
 //! discs fills undercuts. Membership in a solid is therefore a matter of the profile's region, not of inverting X; the
-//! volume is for evaluation and exchange. The formula P = V + W - `W_00` with a fixed disc gives a translational
+//! volume is for evaluation and [`exchange`](crate::exchange). Where it does not fold it is a solid by itself,
+//! answered from its net by [`patch`](crate::patch) and written in scenes as `kind = "volume"` with `construct`. The formula P = V + W - `W_00` with a fixed disc gives a translational
 //! sweep, under its own names: [`translational_curve_disc`], [`translational_surface_circle`].
 //!
 //! # Conventions

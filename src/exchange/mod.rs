@@ -13,6 +13,27 @@
 //! splines; here are the files. [`read_volumes`] and its siblings want splines of one kind and pass
 //! notes to `tracing` as warnings; [`read`] returns all there is, notes included.
 //!
+//! ```
+//! use voxlathe::construct::{AngleInterval, AxisFrame, Construction, DiscForm, cylinder_volume};
+//! use voxlathe::exchange::{self, Format};
+//!
+//! let by = Construction::CurveDisc(DiscForm::Polar);
+//! let turn = AngleInterval::new(0.0, 90.0)?;
+//! let quarter = cylinder_volume(2.0, 3.0, by, turn, &AxisFrame::WORLD)?;
+//! let folder = tempfile::tempdir()?;
+//! for format in Format::ALL {
+//!     let path = folder.path().join("quarter").with_extension(format.extension());
+//!     exchange::write_volumes(&path, std::slice::from_ref(&quarter))?;
+//!     let found = exchange::read(&path)?;
+//!     assert_eq!((found.format, found.splines.len()), (format, 1));
+//!     let same = &exchange::read_volumes(&path)?[0];
+//!     assert_eq!(same.degrees(), quarter.degrees());
+//!     let [p, q] = [same, &quarter].map(|v| v.evaluate([0.25, 0.5, 0.75]).expect("in the domain"));
+//!     assert!((0..3).all(|k| (p[k] - q[k]).abs() < 1e-15));
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! * Shapes: control points Cartesian with separate weights, the first index fastest, whatever order the
 //!   file has. Points of two coordinates are read with z = 0, and a note.
 //! * Units: those of the file; none of the formats names any.

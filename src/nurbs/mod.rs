@@ -62,6 +62,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Volumes are made by [`construct`](crate::construct), read and written by [`exchange`](crate::exchange), and asked
+//! which points they hold by [`patch`](crate::patch).
+//!
 //! Degree p, control points `P_0 ..= P_n`, weights `w_i > 0`, knots `u_0 <= ... <= u_m` with
 //! `m = n + p + 1`.
 //!

@@ -1,6 +1,7 @@
 //! From the data of a volume to its NURBS.
 
 use super::build::{curve, frame};
+use super::error::Place;
 use super::model::{
     self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
     VolumeModel, VolumeSource,
@@ -28,7 +29,8 @@ pub(super) fn part(
 ) -> Result<Part, Error> {
     let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
     let maker = Maker { model, solid };
-    let volumes = match &volume.source {
+    let source = &volume.source;
+    let volumes = match source {
         VolumeSource::Patches(patches) => maker.patches(patches)?,
         VolumeSource::Section { section, turn } => vec![maker.section(section, *turn)?],
         VolumeSource::Curve {
@@ -49,9 +51,13 @@ pub(super) fn part(
         }
     };
     for (index, volume) in volumes.iter().enumerate() {
-        maker.check(index, volume)?;
+        let place = match source {
+            VolumeSource::Patches(patches) => patches[index].place,
+            _ => solid.place,
+        };
+        maker.check(index, volume, place)?;
     }
-    let fields = match &volume.source {
+    let fields = match source {
         VolumeSource::Patches(patches) => fields(patches, &volumes),
         _ => Ok(Vec::new()),
     };
@@ -187,7 +193,7 @@ impl Maker<'_> {
     }
 
     /// Refuses a patch that folds.
-    fn check(&self, index: usize, volume: &NurbsVolume) -> Result<(), Error> {
+    fn check(&self, index: usize, volume: &NurbsVolume, place: Place) -> Result<(), Error> {
         let Err(error) = volume.orientation() else {
             return Ok(());
         };
@@ -195,10 +201,12 @@ impl Maker<'_> {
         match error {
             OrientationError::Folded { .. } if fold_depth(volume) <= HAIR => Ok(()),
             OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
-                let key = format!(".patches[{index}]");
+                let path = format!("{}.patches[{index}]", self.solid.path);
+                let found = Some(error.to_string());
                 let wanted = "a Jacobian determinant of one sign";
                 let hint = "split the patch where it folds, or move its control points";
-                Err(self.fault(&key, error.to_string(), wanted, Some(hint.to_owned())))
+                let hint = Some(hint.to_owned());
+                Err(self.model.error(place, &path, found, wanted, hint).into())
             }
             _ => Ok(()),
         }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use voxlathe::Scene;
+use voxlathe::scene::SolidKind;
 
 /// A scene of one solid: the profile's keys, then the solid's.
 fn solid(profile: &str, keys: &str) -> String {
@@ -296,7 +297,7 @@ pub(crate) fn scenes(crossing: bool) -> Vec<(String, Scene)> {
         .collect()
 }
 
-/// The scenes of the repository.
+/// The scenes of the repository that are made of turned profiles alone, which the oracle knows.
 pub(crate) fn shipped() -> Vec<(String, Scene)> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes");
     let mut paths: Vec<_> = std::fs::read_dir(folder)
@@ -315,6 +316,12 @@ pub(crate) fn shipped() -> Vec<(String, Scene)> {
                 .into_owned();
             let scene = Scene::load(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
             (name, scene)
+        })
+        .filter(|(_, scene)| {
+            let solids = &scene.model().solids;
+            solids
+                .iter()
+                .all(|s| matches!(s.kind, SolidKind::Revolve { .. }))
         })
         .collect()
 }
