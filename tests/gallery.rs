@@ -1,6 +1,7 @@
 //! The README's gallery: a picture and figures of every shipped scene, made by the library itself.
 //!
-//! `cargo test --release --locked --test gallery -- --ignored` makes them anew.
+//! `cargo test --release --locked --test gallery -- --ignored` makes them anew, with
+//! `VOXLATHE_SCENES=torus,vase` those of some scenes alone.
 
 use std::fs;
 
@@ -152,12 +153,24 @@ fn row(name: &str) -> String {
 #[ignore = "minutes long: makes the pictures and the README's gallery anew"]
 fn make_the_gallery() {
     fs::create_dir_all(PICTURES).expect("a directory");
+    let only = std::env::var("VOXLATHE_SCENES").ok();
+    let chosen = |name: &str| {
+        only.as_ref()
+            .is_none_or(|o| o.split(',').any(|n| n == name))
+    };
+    let old = fs::read_to_string(README).expect("the README");
     let mut table =
         "\n| | scene | exact volume | by fractions, off by | `validate` |\n|---|---|---|---|---|\n"
             .to_owned();
     for name in scenes() {
         let start = std::time::Instant::now();
-        table += &row(&name);
+        if chosen(&name) {
+            table += &row(&name);
+        } else {
+            let kept = gallery(&old).lines();
+            let kept = kept.filter(|l| l.contains(&format!("({PICTURES}/{name}.png)")));
+            table.extend(kept.map(|l| format!("{l}\n")));
+        }
         eprintln!("{name}: {:.1?}", start.elapsed());
     }
     table += "\n";
@@ -166,6 +179,9 @@ fn make_the_gallery() {
     let rest = &readme[from + gallery(&readme).len()..];
     let whole = format!("{}{table}{rest}", &readme[..from]);
     fs::write(README, whole).expect("the README");
+    if only.is_some() {
+        return;
+    }
     // What stands elsewhere in the README.
     let load = |name: &str| Scene::load(format!("scenes/{name}.toml")).expect("a shipped scene");
     let cut = RenderOptions {

@@ -127,7 +127,8 @@ fn volumes_hold_what_their_profile_turned_holds() {
 #[test]
 #[ignore = "a million points a solid take minutes"]
 fn volumes_hold_what_their_profile_turned_holds_at_a_million_points() {
-    check_membership(1_000_000);
+    let asked = std::env::var("VOXLATHE_POINTS").ok();
+    check_membership(asked.and_then(|n| n.parse().ok()).unwrap_or(1_000_000));
 }
 
 #[test]
