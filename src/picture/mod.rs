@@ -6,6 +6,8 @@
 //!   grid ───> sample ─────────────────────> contact ─┘       text, ticks, colour
 //! ```
 //!
+//! Over a shaded picture come the parameter lines of volumes, where they are in sight (`lines`).
+//!
 //! Light is linear until the end, where it becomes sRGB. Every pixel is a function of the scene
 //! and the options alone, so any number of threads gives the same bytes.
 
