@@ -378,7 +378,6 @@ fn fractions_add_up_to_the_volume() {
 }
 
 #[test]
-#[ignore = "voxels whose diagonals lie in faces of a volume, or on its singular edges, are off by up to a tenth"]
 fn fractions_of_volumes_add_up_to_the_volume() {
     fractions_add_up(|keys| keys.contains("'volume'"));
 }

@@ -72,6 +72,14 @@ fn spans_equal_point_tests() {
     }
 }
 
+/// What the distance to the faces of volumes may differ by.
+fn certified(scene: &Scene) -> f64 {
+    let mut parts = scene.assembly().parts().iter();
+    let volumes = parts.any(|p| matches!(**p.body(), voxlathe::solid::Body::Patches(_)));
+    let size = scene.bounds().longest_side();
+    if volumes { 4e-14 * size } else { 0.0 }
+}
+
 #[test]
 fn rows_of_distances_equal_points() {
     for (name, scene) in scenes() {
@@ -85,6 +93,9 @@ fn rows_of_distances_equal_points() {
                 let (found, want) = (*sdf.get(i, j, k), scene.assembly().signed_distance(p));
                 // A distance that rounds to 0 is the smallest positive of its type.
                 let ulp = f64::from(f32::EPSILON) * want.abs() + f64::from(f32::from_bits(1));
+                // The nearest point of rational patches is certified to a few roundings of the size,
+                // and where it is sought from decides which of them come out.
+                let ulp = ulp + certified(&scene);
                 assert!(
                     (f64::from(found) - want).abs() <= ulp,
                     "{name}: {found} for {want} at {p}"

@@ -221,7 +221,11 @@ impl<'a> Scanner<'a> {
 
 /// Line and column of a byte of a text.
 pub(super) fn place_of(text: &str, at: usize) -> Place {
-    let before = &text[..text.floor_char_boundary(at.min(text.len()))];
+    let mut end = at.min(text.len());
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    let before = &text[..end];
     let line_start = before.rfind('\n').map_or(0, |i| i + 1);
     Place::Line {
         line: before.bytes().filter(|&b| b == b'\n').count() + 1,

@@ -26,6 +26,10 @@ use crate::math::{Aabb, Side, Similarity};
 use glam::DVec3;
 
 /// A closed solid in space with its exact surface.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "bodies are few, and each is behind a pointer"
+)]
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Body {
@@ -217,7 +221,7 @@ impl Body {
     pub(super) fn price(&self) -> u64 {
         match self {
             Self::Revolved(b) => b.price(),
-            Self::Patches(_) => 30,
+            Self::Patches(_) => 10,
             _ => 1,
         }
     }
