@@ -96,7 +96,13 @@ mod tests {
             (1, 0),
         ];
         let weights: Vec<_> = (0..9)
-            .map(|i| if i % 2 == 0 { 1.0 } else { 0.707_107 })
+            .map(|i| {
+                if i % 2 == 0 {
+                    1.0
+                } else {
+                    std::f64::consts::FRAC_1_SQRT_2
+                }
+            })
             .collect();
         let points = corner.iter().zip(&weights).map(|(&(x, y), &w)| {
             let factor = if premultiplied { w } else { 1.0 };
