@@ -19,7 +19,7 @@ use glam::DVec3;
 /// # Errors
 /// [`MeshError::ChordError`] when it is no such length, [`MeshError::BelowRounding`] when it is below the
 /// rounding of coordinates, [`MeshError::TooManyTriangles`] when it takes more than
-/// [`MAX_TRIANGLES`], [`MeshError::Open`] when the profile's boundary does not close.
+/// [`MAX_TRIANGLES`](super::MAX_TRIANGLES), [`MeshError::Open`] when the profile's boundary does not close.
 ///
 /// ```
 /// let scene = voxlathe::Scene::parse(

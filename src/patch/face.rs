@@ -16,7 +16,7 @@
 //!   the unit times the face's own extent.
 //! * Shared: equal control nets after raising degrees, in one of the eight orders of a square net,
 //!   points to 1e-12 of the unit and weights up to a common factor; see
-//!   [`pair_off`](super::face_match::pair_off). Faces whose knots do not match are cut at each
+//!   [`pair_off`]. Faces whose knots do not match are cut at each
 //!   other's corners first.
 //! * Limits: volumes that overlap, or touch in faces that are not the same map up to an affine change
 //!   of parameters, keep their faces.
