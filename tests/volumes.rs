@@ -323,6 +323,37 @@ fn shared_faces_are_no_boundary() {
 }
 
 #[test]
+fn patches_that_overlap_are_told_of() {
+    let cube = |x: f64| {
+        let corner = |n: u32| {
+            [
+                x + f64::from(n & 1),
+                f64::from(n >> 1 & 1),
+                f64::from(n >> 2),
+            ]
+        };
+        let points: Vec<[f64; 3]> = (0..8).map(corner).collect();
+        format!(
+            "{{ degrees = [1, 1, 1], knots = [[0, 0, 1, 1], [0, 0, 1, 1], [0, 0, 1, 1]], points = {points:?} }}"
+        )
+    };
+    let pair = |x: f64| {
+        scene(&format!(
+            "[[solid]]\nkind = 'volume'\npatches = [{}, {}]",
+            cube(0.0),
+            cube(x)
+        ))
+    };
+    assert!(pair(1.0).warnings().is_empty());
+    let said = pair(0.25);
+    assert!(
+        said.warnings()[0].contains("patches 0 and 1 overlap"),
+        "{:?}",
+        said.warnings()
+    );
+}
+
+#[test]
 fn a_chain_that_runs_back_is_refused_or_taken_as_its_discs() {
     let text = |fill: &str| {
         format!(

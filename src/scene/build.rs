@@ -111,7 +111,17 @@ impl Scene {
                 SolidKind::Volume(volume) => {
                     let notes = volume.notes.iter();
                     warnings.extend(notes.map(|n| format!("{}: {n}", solid.path)));
-                    nets::part(&model, solid, volume)?
+                    let part = nets::part(&model, solid, volume)?;
+                    if let Body::Patches(patches) = &**part.body()
+                        && let Some(([first, later], [x, y, z])) =
+                            patches.overlap().map(|(pair, at)| (pair, at.to_array()))
+                    {
+                        warnings.push(format!(
+                            "{}: patches {first} and {later} overlap, at [{x}, {y}, {z}] for one: each is measured and bounded by itself; make them solids of their own",
+                            solid.path
+                        ));
+                    }
+                    part
                 }
                 SolidKind::Box { size } => {
                     let frame = frame(&model, &solid.axis, &solid.steps, &solid.path)?;

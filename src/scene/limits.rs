@@ -40,6 +40,10 @@ pub const MAX_VOXELS: u32 = i32::MAX as u32;
 /// after projecting has fewer than seven digits.
 pub const MIN_SINE: f64 = 1e-9;
 
+/// Bézier cells of one volume, all patches together: they take some 10 kB and a quarter of a
+/// millisecond each to prepare.
+pub const MAX_CELLS: usize = 100_000;
+
 /// Least length of an ellipsoid or a box as a share of its largest: squares of the quotient keep half of
 /// their digits.
 pub const MIN_ASPECT: f64 = 1e-8;

@@ -2,6 +2,7 @@
 
 use super::build::{curve, frame};
 use super::error::Place;
+use super::limits::MAX_CELLS;
 use super::model::{
     self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
     VolumeModel, VolumeSource,
@@ -50,12 +51,25 @@ pub(super) fn part(
             maker.curve(*form, chain, *turn)?
         }
     };
+    let cells = |v: &NurbsVolume| {
+        v.knots()
+            .iter()
+            .map(|k| k.spans().count())
+            .product::<usize>()
+    };
+    let count = volumes.iter().map(cells).fold(0, usize::saturating_add);
+    if count > MAX_CELLS {
+        let found = format!("{count} Bézier cells");
+        let wanted = format!("at most {MAX_CELLS}: products of the knot spans in u, v and w");
+        return Err(maker.fault("", found, &wanted, Some("use fewer knots".to_owned())));
+    }
     for (index, volume) in volumes.iter().enumerate() {
-        let place = match source {
-            VolumeSource::Patches(patches) => patches[index].place,
-            _ => solid.place,
+        let (place, key) = match source {
+            VolumeSource::Patches(patches) => (patches[index].place, format!(".patches[{index}]")),
+            VolumeSource::Section { section, .. } => (section.place, ".section".to_owned()),
+            VolumeSource::Curve { .. } => (solid.place, ".profile".to_owned()),
         };
-        maker.check(index, volume, place)?;
+        maker.check(&key, volume, place)?;
     }
     let fields = match source {
         VolumeSource::Patches(patches) => fields(patches, &volumes),
@@ -193,7 +207,7 @@ impl Maker<'_> {
     }
 
     /// Refuses a patch that folds.
-    fn check(&self, index: usize, volume: &NurbsVolume, place: Place) -> Result<(), Error> {
+    fn check(&self, key: &str, volume: &NurbsVolume, place: Place) -> Result<(), Error> {
         let Err(error) = volume.orientation() else {
             return Ok(());
         };
@@ -201,7 +215,7 @@ impl Maker<'_> {
         match error {
             OrientationError::Folded { .. } if fold_depth(volume) <= HAIR => Ok(()),
             OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
-                let path = format!("{}.patches[{index}]", self.solid.path);
+                let path = format!("{}{key}", self.solid.path);
                 let found = Some(error.to_string());
                 let wanted = "a Jacobian determinant of one sign";
                 let hint = "split the patch where it folds, or move its control points";

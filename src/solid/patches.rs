@@ -155,6 +155,27 @@ impl Patches {
         &self.nets.volumes
     }
 
+    /// Two volumes that both hold the middle of a cell of the later one, and where, in local
+    /// coordinates; `None` where no middle is held twice.
+    #[must_use]
+    pub fn overlap(&self) -> Option<([usize; 2], DVec3)> {
+        for (later, volume) in self.nets.volumes.iter().enumerate().skip(1) {
+            for piece in volume.to_bezier().unwrap_or_default() {
+                let Ok(middle) = volume.evaluate(piece.parameters([0.5; 3])) else {
+                    continue;
+                };
+                let middle = DVec3::from_array(middle);
+                // Of several the lowest answers.
+                if let Some(found) = self.nets.cells.invert(middle)
+                    && found.volume < later
+                {
+                    return Some(([found.volume, later], middle));
+                }
+            }
+        }
+        None
+    }
+
     /// The faces that bound the solid, in local coordinates.
     pub(crate) fn faces(&self) -> &FaceSet {
         &self.nets.faces
