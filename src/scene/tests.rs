@@ -315,7 +315,7 @@ fn missing_keys_are_refused() {
     );
     refuses(
         &small("kind = \"revolve\"\n", "kid = \"revolve\"\n"),
-        "vase.toml:6:1: solid[0]: found no key `kind`, wanted one of revolve, torus, cylinder, cone, sphere, ellipsoid, box; is `kid` meant to be `kind`?",
+        "vase.toml:6:1: solid[0]: found no key `kind`, wanted one of revolve, torus, cylinder, cone, sphere, ellipsoid, box, volume; is `kid` meant to be `kind`?",
     );
     refuses(
         &small("radius = 1\n", ""),
