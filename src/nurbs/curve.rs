@@ -14,6 +14,7 @@
 //! * Source: Piegl & Tiller, *The NURBS Book*, 2nd ed., chapter 4.
 
 use super::basis::SpanFactors;
+use super::homogeneous::check_control;
 use super::knot_vector::check_degree;
 use super::{Homogeneous, KnotVector, MAX_DEGREE, NurbsError, rational_derivatives};
 
@@ -60,24 +61,7 @@ impl<const D: usize> NurbsCurve<D> {
                 expected: points.len(),
             });
         }
-        for (index, (&point, &weight)) in points.iter().zip(&weights).enumerate() {
-            if !(weight > 0.0 && weight.is_finite()) {
-                return Err(NurbsError::Weight {
-                    index,
-                    found: weight,
-                });
-            }
-            for (axis, found) in point.into_iter().enumerate() {
-                if !(found.is_finite() && (found * weight).is_finite()) {
-                    return Err(NurbsError::ControlPoint {
-                        index,
-                        axis,
-                        found,
-                        weight,
-                    });
-                }
-            }
-        }
+        check_control(&points, &weights)?;
         Ok(Self {
             knots,
             points,

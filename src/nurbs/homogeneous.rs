@@ -99,6 +99,33 @@ impl<const D: usize> Homogeneous<D> {
     }
 }
 
+/// Whether points and weights, as many of each, can be control points: weights greater than zero, and
+/// coordinates finite, with their weight and without.
+pub(super) fn check_control<const D: usize>(
+    points: &[[f64; D]],
+    weights: &[f64],
+) -> Result<(), NurbsError> {
+    for (index, (&point, &weight)) in points.iter().zip(weights).enumerate() {
+        if !(weight > 0.0 && weight.is_finite()) {
+            return Err(NurbsError::Weight {
+                index,
+                found: weight,
+            });
+        }
+        for (axis, found) in point.into_iter().enumerate() {
+            if !(found.is_finite() && (found * weight).is_finite()) {
+                return Err(NurbsError::ControlPoint {
+                    index,
+                    axis,
+                    found,
+                    weight,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Derivatives of A / w from those of A and w.
 ///
 /// ```text

@@ -9,6 +9,7 @@
 //! * Source: Piegl & Tiller, *The NURBS Book*, 2nd ed., §4.4; volumes: Lasser (1985).
 
 use super::curve::bounds;
+use super::homogeneous::check_control;
 use super::{Homogeneous, KnotVector, LocalBasis, NurbsError, rational_derivatives};
 
 /// A rational B-spline map of N parameters into space: [`NurbsSurface`] and [`NurbsVolume`].
@@ -63,24 +64,7 @@ impl<const N: usize> NurbsTensor<N> {
                 });
             }
         }
-        for (index, (&point, &weight)) in points.iter().zip(&weights).enumerate() {
-            if !(weight > 0.0 && weight.is_finite()) {
-                return Err(NurbsError::Weight {
-                    index,
-                    found: weight,
-                });
-            }
-            for (axis, found) in point.into_iter().enumerate() {
-                if !(found.is_finite() && (found * weight).is_finite()) {
-                    return Err(NurbsError::ControlPoint {
-                        index,
-                        axis,
-                        found,
-                        weight,
-                    });
-                }
-            }
-        }
+        check_control(&points, &weights)?;
         Ok(Self {
             knots,
             points,
