@@ -1,5 +1,5 @@
-//! Row spans against a point test at every voxel, and signed distances of rows against those of
-//! points: bit for bit, on prime-sized grids, aligned and tilted.
+//! Row spans against a point test at every voxel, bit for bit, and signed distances of rows against those of
+//! points, within max(2 ulp, 1e-4 of the least spacing): on prime-sized grids, aligned and tilted.
 
 use glam::DVec3;
 use voxlathe::Scene;
@@ -93,6 +93,7 @@ fn rows_of_distances_equal_points() {
                 let (found, want) = (*sdf.get(i, j, k), scene.assembly().signed_distance(p));
                 // A distance that rounds to 0 is the smallest positive of its type.
                 let ulp = f64::from(f32::EPSILON) * want.abs() + f64::from(f32::from_bits(1));
+                let ulp = (2.0 * ulp).max(1e-4 * grid.spacing().min_element());
                 // The nearest point of rational patches is certified to a few roundings of the size,
                 // and where it is sought from decides which of them come out.
                 let ulp = ulp + certified(&scene);

@@ -1,5 +1,7 @@
 //! What can be typed.
 
+use super::failure::Failure;
+use crate::math::{Kernel, SimdLevel};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -44,6 +46,9 @@ pub(super) struct Common {
     /// When to colour what people read
     #[arg(long, global = true, help_heading = "Common options", value_name = "WHEN", value_enum, default_value_t = Color::Auto)]
     pub(super) color: Color,
+    /// Instructions of the inner loops. The results do not depend on it
+    #[arg(long, global = true, help_heading = "Common options", value_name = "LEVEL", value_enum, default_value_t = Simd::Auto)]
+    pub(super) simd: Simd,
     /// Change a key of the scene, may be repeated: a dotted path with array indices from 0, and a
     /// value as TOML, else as a string (grid.resolution=64, solid.0.angle=270, units=mm)
     #[arg(
@@ -56,6 +61,31 @@ pub(super) struct Common {
     /// Write one JSON document to standard output, and nothing else there
     #[arg(long, global = true, help_heading = "Common options")]
     pub(super) json: bool,
+}
+
+impl Common {
+    /// The inner loops that were asked for.
+    pub(super) fn kernel(&self) -> Result<Kernel, Failure> {
+        let level = match self.simd {
+            Simd::Auto => SimdLevel::Auto,
+            Simd::Scalar => SimdLevel::Scalar,
+            Simd::Avx2 => SimdLevel::Avx2,
+            Simd::Avx512 => SimdLevel::Avx512,
+        };
+        Kernel::new(level).map_err(|e| Failure::usage(format!("--simd: {e}; choose auto")))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Simd {
+    /// The widest this machine has
+    Auto,
+    /// One value at a time
+    Scalar,
+    /// AVX2
+    Avx2,
+    /// AVX-512
+    Avx512,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -86,6 +116,8 @@ pub(super) enum Command {
     Export(Export),
     /// Draw the solid, shaded or as a section with distance isolines
     Render(Render),
+    /// Measure each stage's throughput against writing the same bytes
+    Bench(Bench),
     /// Show what a finished stack holds, and verify its digests
     Info(Info),
     /// Write a manual page, shell completions or the schema of scene files to standard output
@@ -385,6 +417,24 @@ pub(super) struct Info {
     /// Directory of a finished stack
     #[arg(value_name = "DIR")]
     pub(super) directory: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Stages: prepare, occupancy, occupancy-slab, sdf, sdf-slab, sdf-band, fraction, basis, encode, write, voxelize. The
+ratio says how fast a stage writes its bytes, compared with a plain fill of the whole grid's bytes by the same threads
+in the same run.
+
+Example: voxlathe bench scenes/goblet.toml --resolution 512 --stages occupancy,sdf")]
+pub(super) struct Bench {
+    /// The scene: TOML, JSON by its ending, or - for TOML on standard input
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    #[command(flatten)]
+    pub(super) step: Step,
+    /// Stages to run; all without it
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(super) stages: Vec<String>,
 }
 
 #[derive(Debug, Args)]

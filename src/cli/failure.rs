@@ -17,6 +17,8 @@ pub(super) enum Failure {
     Usage(String),
     /// Standard output could not be written.
     Output(String),
+    /// Answers that should be equal are not.
+    Disagreement(String),
     /// Anything of the library.
     Library(Error),
 }
@@ -26,6 +28,10 @@ impl Failure {
         Self::Usage(text.into())
     }
 
+    pub(super) fn disagrees(text: impl Into<String>) -> Self {
+        Self::Disagreement(text.into())
+    }
+
     pub(super) fn output(error: &std::io::Error) -> Self {
         Self::Output(format!("cannot write to standard output: {error}"))
     }
@@ -33,6 +39,7 @@ impl Failure {
     fn code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
+            Self::Disagreement(_) => 1,
             Self::Output(_) => 3,
             Self::Library(error) => match error {
                 Error::Scene(SceneError::Read { .. }) => 3,
@@ -50,7 +57,7 @@ impl Failure {
     /// The message with everything that caused it.
     fn message(&self) -> String {
         match self {
-            Self::Usage(text) | Self::Output(text) => text.clone(),
+            Self::Usage(text) | Self::Output(text) | Self::Disagreement(text) => text.clone(),
             Self::Library(error) => {
                 let mut text = error.to_string();
                 let mut cause = std::error::Error::source(error);

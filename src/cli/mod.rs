@@ -3,6 +3,7 @@
 //! Results go to standard output, everything meant for people while it runs to standard error.
 
 mod arguments;
+mod bench;
 mod converge;
 mod export;
 mod failure;
@@ -70,6 +71,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Mesh(a) => mesh::run(a, common, console),
         Command::Export(a) => export::run(a, common, console),
         Command::Render(a) => render::run(a, common, console),
+        Command::Bench(a) => bench::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }

@@ -11,8 +11,12 @@ pub mod tolerance;
 
 mod aabb;
 mod side;
+mod simd;
 
 pub use aabb::Aabb;
 pub use dd::{Dd, Real};
 pub use side::Side;
+#[cfg(test)]
+pub(crate) use simd::every_kernel;
+pub use simd::{Kernel, SimdLevel, SimdUnavailable};
 pub use similarity::Similarity;

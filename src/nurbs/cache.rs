@@ -21,8 +21,9 @@
 //!   in index order without fused operations, the same on every machine.
 //! * Source: Piegl & Tiller, *The NURBS Book*, 2nd ed., Algorithms A2.2, A2.3 and A4.1.
 
+use super::Kernel;
 use super::basis::SpanFactors;
-use super::kernel::{Kernel, Rows, scalar, wide};
+use super::kernel::{Rows, scalar, wide};
 use super::{KnotVector, NurbsError};
 use std::collections::HashMap;
 use std::collections::hash_map::DefaultHasher;
@@ -486,9 +487,9 @@ fn key(knots: &KnotVector, samples: &[f64], order: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::super::SimdLevel;
-    use super::super::kernel::every_kernel;
     use super::super::testing::{gamma, knot_vectors, parameter};
     use super::*;
+    use crate::math::every_kernel;
     use proptest::prelude::*;
 
     fn bits(values: &[f64]) -> Vec<u64> {

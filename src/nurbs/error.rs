@@ -2,7 +2,7 @@
 //!
 //! Each variant names the place, the value found there and the value wanted.
 
-use super::{MAX_DEGREE, MAX_KNOT_MAGNITUDE, MIN_SPAN_WIDTH, SimdLevel};
+use super::{MAX_DEGREE, MAX_KNOT_MAGNITUDE, MIN_SPAN_WIDTH};
 
 /// Why a spline cannot be, or cannot answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -207,11 +207,5 @@ pub enum NurbsError {
     TableKnots {
         /// Which direction, from 0.
         direction: usize,
-    },
-    /// The processor lacks the instructions that were asked for.
-    #[error("this machine has no {level:?} instructions")]
-    SimdUnavailable {
-        /// What was asked for.
-        level: SimdLevel,
     },
 }

@@ -98,6 +98,7 @@ mod tensor_testing;
 #[cfg(test)]
 mod testing;
 
+pub use crate::math::{Kernel, SimdLevel};
 pub use basis::{LocalBasis, MAX_DERIVATIVE_ORDER};
 pub use bezier::{BezierPiece, RationalBezier};
 pub use cache::{BasisCache, BasisTable, combine, tabulate};
@@ -105,7 +106,6 @@ pub use cell::BezierCell;
 pub use curve::NurbsCurve;
 pub use error::NurbsError;
 pub use homogeneous::{Homogeneous, rational_derivatives};
-pub use kernel::{Kernel, SimdLevel};
 pub use knot_vector::{KnotSpan, KnotVector, MAX_DEGREE, MAX_KNOT_MAGNITUDE, MIN_SPAN_WIDTH};
 pub use orientation::{JacobianSign, Orientation, OrientationError};
 pub use refine::{clamp, elevate_degree, insert_knot, refine_knots};

@@ -257,12 +257,12 @@ impl<const N: usize> Grid<'_, N> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kernel::every_kernel;
     use super::super::net::indices;
     use super::super::tensor_testing::{extent, inside, maps};
     use super::super::testing::{gamma, gap};
     use super::super::{KnotVector, NurbsSurface, SimdLevel};
     use super::*;
+    use crate::math::every_kernel;
     use proptest::prelude::*;
 
     fn plain() -> Kernel {

@@ -11,14 +11,18 @@
 //!                                       └──> moments     how much is it?
 //! ```
 
+mod arcs;
 mod boundary;
+mod chain;
 mod crossings;
 mod curve;
 mod distance;
 mod error;
+mod field;
 mod moments;
 mod piece;
 mod profile;
+mod radial;
 mod section;
 mod tree;
 mod weld;
@@ -30,10 +34,13 @@ pub use error::RegionError;
 pub use profile::{Boundary, Fill, ProfileLoop, Region};
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
+pub(crate) use chain::Chain;
 pub(crate) use crossings::MeridianPoint;
 pub(crate) use curve::{HomogeneousPoint, beziers};
+pub(crate) use field::{Extent, MeridianField};
 pub(crate) use moments::{Estimate, SectionMoments};
 pub(crate) use piece::Piece;
+pub(crate) use radial::RadialTable;
 pub(crate) use section::Section;
 pub(crate) use tree::{Box2, BoxTree};
 pub(crate) use weld::welded;

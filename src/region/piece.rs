@@ -171,6 +171,69 @@ impl Piece {
         self.at(self.parameter_at(c, v))[1 - c]
     }
 
+    /// Bounds of the other coordinate where coordinate `c` takes the value `v`, which must lie within the piece's range
+    /// of it: by f64 alone. `None` where its rounding leaves no bracket.
+    pub(crate) fn bracket_at(&self, c: usize, v: Dd) -> Option<[f64; 2]> {
+        let t = &self.twin;
+        let q = (v - Dd::of(t.origin[c])).f64();
+        let error = t.error + 4.0 * f64::EPSILON * q.abs();
+        let rising = if self.end[c] > self.start[c] {
+            1.0
+        } else {
+            -1.0
+        };
+        let beyond = |p: [f64; 2]| rising * (p[c] - q);
+        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+        let parameter = |i: usize| i as f64 / TABLE as f64;
+        let (mut low, mut high) = (0.0_f64, 1.0_f64);
+        let (mut below, mut above) = (beyond(t.at(0.0)), beyond(t.at(1.0)));
+        if !t.table.is_empty() {
+            let next = t
+                .table
+                .partition_point(|&p| beyond(p) < 0.0)
+                .clamp(1, TABLE);
+            (low, below) = (parameter(next - 1), beyond(t.table[next - 1]));
+            (high, above) = (parameter(next), beyond(t.table[next]));
+        }
+        // Secant and bisection in turn.
+        let mut slope = (above - below) / (high - low);
+        for step in 0..40 {
+            if high - low <= 4.0 * f64::EPSILON || below.abs().min(above.abs()) <= error {
+                break;
+            }
+            let share = if step % 2 == 0 {
+                (below / (below - above)).clamp(1e-3, 1.0 - 1e-3)
+            } else {
+                0.5
+            };
+            let m = low + (high - low) * share;
+            let at = beyond(t.at(m));
+            if at < 0.0 {
+                (low, below) = (m, at);
+            } else {
+                (high, above) = (m, at);
+            }
+            let chord = (above - below) / (high - low);
+            if chord > 0.0 {
+                slope = chord;
+            }
+        }
+        let middle = if below.abs() < above.abs() { low } else { high };
+        let mut width = (4.0 * error / slope).max(4.0 * f64::EPSILON);
+        for _ in 0..24 {
+            let (a, b) = ((middle - width).max(0.0), (middle + width).min(1.0));
+            let (p, r) = (t.at(a), t.at(b));
+            // An end of the piece is on its side whatever the rounding says.
+            if (a == 0.0 || beyond(p) < -error) && (b == 1.0 || beyond(r) > error) {
+                let (o, margin) = (t.origin[1 - c], t.error + 2.0 * f64::EPSILON);
+                let (x, y) = (p[1 - c] + o, r[1 - c] + o);
+                return Some([x.min(y) - margin, x.max(y) + margin]);
+            }
+            width *= 4.0;
+        }
+        None
+    }
+
     /// Where the point lies, in double-double. `z` must lie within the piece's heights and the
     /// piece must not be horizontal.
     pub(crate) fn position_exact(&self, r: Dd, z: Dd) -> Position {
@@ -437,4 +500,54 @@ pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
             (t, [a / c, b / c])
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::region::{Boundary, Fill, ProfileCurve, Region};
+
+    #[test]
+    fn quick_brackets_hold_the_exact_place() {
+        let nurbs = ProfileCurve::Nurbs {
+            degree: 3,
+            knots: vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0],
+            points: vec![[0.8, 0.0], [1.6, 0.0], [0.2, 1.0], [0.9, 1.8]],
+            weights: vec![1.0, 3.0, 0.5, 1.0],
+        };
+        let ring = ProfileCurve::Arc {
+            center: [3.0, 0.5],
+            radii: [1.0, 0.01],
+            tilt: 1.0,
+            from: 0.0,
+            to: 360.0,
+        };
+        for (curve, boundary) in [(nurbs, Boundary::ToAxis), (ring, Boundary::Closed)] {
+            let region = Region::new(&[vec![curve]], boundary, Fill::EvenOdd).expect("a region");
+            let (mut widest, mut missing, mut all) = (0.0_f64, 0, 0);
+            for piece in region.section().pieces().iter().filter(|p| p.degree() > 1) {
+                let (a, b) = (piece.start[1], piece.end[1]);
+                for i in 1..400_u32 {
+                    // Crowded towards both ends, where the pieces turn.
+                    let x = f64::from(i) / 400.0;
+                    let v = a + (b - a) * Dd::of(x * x * (3.0 - 2.0 * x)).sqrt();
+                    let exact = piece.other_at(1, v);
+                    all += 1;
+                    let Some([low, high]) = piece.bracket_at(1, v) else {
+                        missing += 1;
+                        continue;
+                    };
+                    assert!(
+                        Dd::of(low) <= exact && exact <= Dd::of(high),
+                        "{low} {high} for {exact:?} at {v:?}"
+                    );
+                    widest = widest.max(high - low);
+                }
+            }
+            eprintln!(
+                "{all} heights: widest bracket {widest:.1e}, {missing} left to double-double"
+            );
+            assert!(missing * 10 <= all && widest < 1e-6);
+        }
+    }
 }

@@ -1,10 +1,14 @@
 //! One z layer of every channel.
 
+use super::bits;
 use super::fraction::FractionSampler;
+use super::memory::copy_past_caches;
+use super::radial::{RadialSampler, RadialScratch, Writing};
 use super::tally::{Certainty, Tally};
+use super::upright::{UprightBody, UprightScratch};
 use crate::grid::GridSpec;
-use crate::math::Side;
-use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Row, Scalar, signed};
+use crate::math::{Kernel, Side};
+use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Revolved, Row, Scalar, signed};
 use std::sync::Arc;
 
 /// A quantity sampled on a grid.
@@ -48,7 +52,7 @@ impl Selection {
 }
 
 /// The values of one layer, x fastest, then y. Channels not wanted stay empty.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct LayerBuffers {
     /// 1 inside, 0 outside.
     pub occupancy: Vec<u8>,
@@ -66,6 +70,7 @@ pub struct LayerBuffers {
     pub fraction_sum: f64,
     /// What was counted on the way.
     pub tally: Tally,
+    scratch: LayerScratch,
 }
 
 /// Asked between rows whether to stop.
@@ -83,6 +88,11 @@ pub struct LayerSampler<'a> {
     /// Surface and material of the added parts, the last first; empty where there is one material.
     layered: Vec<(usize, u32)>,
     scalars: Vec<Scalar>,
+    kernel: Kernel,
+    /// The rows of the one body, where its axis is parallel to grid z.
+    upright: Option<UprightBody>,
+    /// The distances of such a body.
+    radial: Option<RadialSampler>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -92,6 +102,22 @@ impl std::fmt::Debug for LayerSampler<'_> {
             .field("selection", &self.selection)
             .finish_non_exhaustive()
     }
+}
+
+/// What one thread reuses from layer to layer.
+#[derive(Debug, Default)]
+pub(super) struct LayerScratch {
+    /// A bit for each voxel that is inside.
+    inside: Vec<u64>,
+    bytes: Vec<u8>,
+    upright: UprightScratch,
+    radial: RadialScratch,
+}
+
+/// What is left to the rows.
+struct Rest {
+    occupancy: bool,
+    sdf: bool,
 }
 
 /// What one thread reuses from row to row.
@@ -132,6 +158,9 @@ impl<'a> LayerSampler<'a> {
         } else {
             (assembly.bodies().to_vec(), Vec::new())
         };
+        let body = assembly.single().and_then(Body::revolved);
+        let upright = body.and_then(|b| UprightBody::new(b, grid));
+        let radial = body.filter(|_| selection.sdf && upright.is_some());
         Self {
             cancel: None,
             assembly,
@@ -141,7 +170,16 @@ impl<'a> LayerSampler<'a> {
             surfaces,
             layered,
             scalars: Vec::new(),
+            kernel: Kernel::default(),
+            upright,
+            radial: radial.and_then(|b| RadialSampler::new(b, grid)),
         }
+    }
+
+    /// A sampler whose inner loops are those of `kernel`; the values do not depend on it.
+    #[must_use]
+    pub fn with_kernel(self, kernel: Kernel) -> Self {
+        Self { kernel, ..self }
     }
 
     /// A sampler that fills [`LayerBuffers::scalars`] with these, too.
@@ -171,7 +209,6 @@ impl<'a> LayerSampler<'a> {
 
     /// Fills `out` with layer `k`.
     pub fn sample(&self, k: usize, out: &mut LayerBuffers) {
-        let [nx, ny, _] = self.grid.dims();
         let n = self.grid.layer_len();
         out.occupancy.clear();
         out.occupancy.resize(n, 0);
@@ -193,6 +230,35 @@ impl<'a> LayerSampler<'a> {
         out.fraction_sum = 0.0;
         out.tally = Tally::default();
 
+        let mut scratch = std::mem::take(&mut out.scratch);
+        let fast = self.layer_bits(k, &mut scratch);
+        if fast {
+            out.inside = bits::count(&scratch.inside);
+            bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
+        }
+        let measured =
+            fast && self.selection.sdf && self.radial_layer(k, &mut scratch, &mut out.sdf, false);
+        if measured {
+            self.count_exact(&out.sdf, &mut out.tally.certainty);
+        }
+        out.scratch = scratch;
+        let rest = Rest {
+            occupancy: !fast,
+            sdf: self.selection.sdf && !measured,
+        };
+        self.rows(k, &rest, out);
+    }
+
+    /// What the rows of a layer still need.
+    fn rows(&self, k: usize, rest: &Rest, out: &mut LayerBuffers) {
+        let [nx, ny, _] = self.grid.dims();
+        let sides = rest.occupancy
+            || rest.sdf
+            || self.fractions.is_some()
+            || self.selection.material && !self.layered.is_empty();
+        if !(sides || self.selection.material || !self.scalars.is_empty()) {
+            return;
+        }
         let band = self.selection.band.unwrap_or(f64::INFINITY);
         let mut scratch = Scratch {
             sides: vec![vec![Side::Outside; nx]; self.surfaces.len()],
@@ -206,11 +272,15 @@ impl<'a> LayerSampler<'a> {
             if self.cancel.is_some_and(|cancel| cancel()) {
                 return;
             }
-            self.side_row(j, k, &layers, &mut scratch);
+            if sides {
+                self.side_row(j, k, &layers, &mut scratch);
+            }
             let range = j * nx..(j + 1) * nx;
             let occupancy = &mut out.occupancy[range.clone()];
-            self.occupancy_row(j, k, &scratch.sides, occupancy);
-            out.inside += occupancy.iter().map(|&o| u64::from(o)).sum::<u64>();
+            if rest.occupancy {
+                self.occupancy_row(j, k, &scratch.sides, occupancy);
+                out.inside += occupancy.iter().map(|&o| u64::from(o)).sum::<u64>();
+            }
             if self.selection.material {
                 let material = &mut out.material[range.clone()];
                 self.material_row(j, k, &scratch.sides, occupancy, material);
@@ -219,7 +289,7 @@ impl<'a> LayerSampler<'a> {
             if !self.scalars.is_empty() {
                 self.scalar_row([j, k], occupancy, &mut out.scalars);
             }
-            if self.selection.sdf {
+            if rest.sdf {
                 let sdf = &mut out.sdf[range.clone()];
                 self.distance_row(j, k, &mut scratch, occupancy, sdf, &mut out.tally.certainty);
             }
@@ -232,6 +302,115 @@ impl<'a> LayerSampler<'a> {
                     &mut out.fraction[range],
                 );
             }
+        }
+    }
+
+    /// The one body that rows are taken from in whole layers.
+    fn upright_body(&self) -> Option<(&Revolved, &UprightBody)> {
+        Some((self.assembly.single()?.revolved()?, self.upright.as_ref()?))
+    }
+
+    /// The bits of layer `k`, where they are found in whole layers.
+    fn layer_bits(&self, k: usize, scratch: &mut LayerScratch) -> bool {
+        let Some((body, upright)) = self.upright_body() else {
+            return false;
+        };
+        let LayerScratch {
+            inside,
+            upright: own,
+            ..
+        } = scratch;
+        inside.clear();
+        inside.resize(bits::words_for(self.grid.layer_len()), 0);
+        upright.layer(self.kernel, body, self.grid, k, own, inside);
+        true
+    }
+
+    /// The distances of layer `k` from its bits, where a table holds them.
+    fn radial_layer(
+        &self,
+        k: usize,
+        scratch: &mut LayerScratch,
+        out: &mut [f32],
+        past_caches: bool,
+    ) -> bool {
+        let (Some((body, _)), Some(radial)) = (self.upright_body(), &self.radial) else {
+            return false;
+        };
+        let writing = Writing {
+            kernel: self.kernel,
+            band: self.selection.band.unwrap_or(f64::INFINITY),
+            past_caches,
+        };
+        let LayerScratch {
+            inside,
+            radial: own,
+            ..
+        } = scratch;
+        radial.layer(body, self.grid, k, inside, writing, own, out);
+        true
+    }
+
+    /// Counts distances that are all exact.
+    fn count_exact(&self, sdf: &[f32], certainty: &mut Certainty) {
+        let band = stored(self.selection.band.unwrap_or(f64::INFINITY));
+        let near = stored(3.0 * self.grid.spacing().max_element());
+        let (mut all, mut close) = (0, 0);
+        for values in sdf.chunks(1 << 16) {
+            let (mut a, mut c) = (0_u32, 0_u32);
+            for value in values {
+                let within = value.abs() < band;
+                a += u32::from(within);
+                c += u32::from(within & (value.abs() <= near));
+            }
+            all += u64::from(a);
+            close += u64::from(c);
+        }
+        certainty.exact += all;
+        certainty.exact_near += close;
+    }
+
+    /// The grid that is sampled.
+    #[must_use]
+    pub fn grid(&self) -> &GridSpec {
+        self.grid
+    }
+
+    /// What is sampled.
+    #[must_use]
+    pub fn selection(&self) -> &Selection {
+        &self.selection
+    }
+
+    /// Whether [`occupancy_into`](Self::occupancy_into) serves.
+    pub(super) fn fills_occupancy(&self) -> bool {
+        self.upright.is_some()
+    }
+
+    /// Whether [`distance_into`](Self::distance_into) serves.
+    pub(super) fn fills_distance(&self) -> bool {
+        self.radial.is_some()
+    }
+
+    /// Fills one layer of occupancy in a large buffer.
+    pub(super) fn occupancy_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u8]) {
+        /// Voxels expanded at once, in the first cache.
+        const PART: usize = 1 << 12;
+        if !self.layer_bits(k, scratch) {
+            return;
+        }
+        scratch.bytes.resize(PART, 0);
+        for (words, out) in scratch.inside.chunks(PART / 64).zip(out.chunks_mut(PART)) {
+            let bytes = &mut scratch.bytes[..out.len()];
+            bits::expand(self.kernel, words, bytes);
+            copy_past_caches(self.kernel, bytes, out);
+        }
+    }
+
+    /// Fills one layer of distances in a large buffer.
+    pub(super) fn distance_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [f32]) {
+        if self.layer_bits(k, scratch) {
+            self.radial_layer(k, scratch, out, true);
         }
     }
 

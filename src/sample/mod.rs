@@ -4,10 +4,16 @@
 //! [`crate::solid`], so that one point test serves a whole run; distances and fractions follow row
 //! by row. Layers do not depend on each other: any number of threads gives the same values.
 
+mod bits;
 mod divided;
 mod fraction;
 mod layer;
+mod memory;
+mod plane;
+mod radial;
+mod spread;
 mod tally;
+mod upright;
 mod volume;
 
 pub(crate) use layer::stored;

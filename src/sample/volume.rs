@@ -1,10 +1,20 @@
 //! Whole volumes in memory, for callers who want them so.
 
-use super::layer::{LayerBuffers, LayerSampler, Selection};
+use super::layer::{LayerBuffers, LayerSampler, LayerScratch, Selection};
+use super::memory::advise_large_pages;
 use crate::grid::{GridSpec, Volume};
 use crate::scene::Scene;
 use crate::solid::Assembly;
 use rayon::prelude::*;
+
+/// A volume that `fill` writes, on large pages where the system has them.
+fn fresh<T: Copy + Default>(grid: &GridSpec, fill: impl FnOnce(&mut [T])) -> Volume<T> {
+    // Zeroed pages are not touched until they are filled.
+    let mut data = vec![T::default(); grid.layer_len() * grid.dims()[2]];
+    advise_large_pages(&mut data);
+    fill(&mut data);
+    Volume::new(*grid, data)
+}
 
 /// Samples every layer in parallel and copies what `take` picks into one volume.
 fn whole<T: Copy + Default + Send>(
@@ -14,16 +24,67 @@ fn whole<T: Copy + Default + Send>(
     take: impl Fn(&LayerBuffers) -> &[T] + Sync,
 ) -> Volume<T> {
     let sampler = LayerSampler::new(assembly, grid, selection);
-    let n = grid.layer_len();
-    let mut data = vec![T::default(); n * grid.dims()[2]];
-    data.par_chunks_mut(n).enumerate().for_each_init(
-        LayerBuffers::default,
-        |buffers, (k, layer)| {
-            sampler.sample(k, buffers);
-            layer.copy_from_slice(take(buffers));
-        },
-    );
-    Volume::new(*grid, data)
+    fresh(grid, |data| sampler.layers_into(data, &take))
+}
+
+impl LayerSampler<'_> {
+    /// Samples every layer in parallel and copies what `take` picks.
+    fn layers_into<T: Copy + Send>(
+        &self,
+        out: &mut [T],
+        take: impl Fn(&LayerBuffers) -> &[T] + Sync,
+    ) {
+        let layers = out.par_chunks_mut(self.grid().layer_len());
+        layers
+            .enumerate()
+            .for_each_init(LayerBuffers::default, |buffers, (k, layer)| {
+                self.sample(k, buffers);
+                layer.copy_from_slice(take(buffers));
+            });
+    }
+
+    /// Fills a buffer of one value for each voxel with the occupancy of the whole grid, in parallel: 1 where the
+    /// voxel's centre is inside, else 0.
+    ///
+    /// # Panics
+    /// When `out` does not have one value for each voxel.
+    pub fn fill_occupancy(&self, out: &mut [u8]) {
+        self.check_length(out.len());
+        if !self.fills_occupancy() {
+            self.layers_into(out, |b| &b.occupancy);
+            return;
+        }
+        let layers = out.par_chunks_mut(self.grid().layer_len()).enumerate();
+        layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
+            self.occupancy_into(k, scratch, layer);
+        });
+    }
+
+    /// Fills a buffer of one value for each voxel with the signed distances of the whole grid, in parallel. The
+    /// sampler's selection must have [`Selection::sdf`].
+    ///
+    /// # Panics
+    /// When `out` does not have one value for each voxel, or the selection has no distances.
+    pub fn fill_signed_distance(&self, out: &mut [f32]) {
+        self.check_length(out.len());
+        assert!(self.selection().sdf, "a selection with distances");
+        if !self.fills_distance() {
+            self.layers_into(out, |b| &b.sdf);
+            return;
+        }
+        let layers = out.par_chunks_mut(self.grid().layer_len()).enumerate();
+        layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
+            self.distance_into(k, scratch, layer);
+        });
+    }
+
+    fn check_length(&self, found: usize) {
+        assert_eq!(
+            found as u64,
+            self.grid().voxel_count(),
+            "one value for each voxel"
+        );
+    }
 }
 
 /// Occupancy of a scene's solid: 1 where the voxel's centre is inside, else 0.
@@ -32,9 +93,8 @@ fn whole<T: Copy + Default + Send>(
 /// [`crate::Error`] when the volume does not fit the address space.
 pub fn occupancy(scene: &Scene, grid: &GridSpec) -> Result<Volume<u8>, crate::Error> {
     fits(grid, 1)?;
-    Ok(whole(scene.assembly(), grid, Selection::default(), |b| {
-        &b.occupancy
-    }))
+    let sampler = LayerSampler::new(scene.assembly(), grid, Selection::default());
+    Ok(fresh(grid, |data| sampler.fill_occupancy(data)))
 }
 
 /// Share of each voxel that the solid fills, within 1e-6.
@@ -60,15 +120,12 @@ pub fn fraction(scene: &Scene, grid: &GridSpec) -> Result<Volume<f32>, crate::Er
 /// [`crate::Error`] when the volume does not fit the address space.
 pub fn signed_distance(scene: &Scene, grid: &GridSpec) -> Result<Volume<f32>, crate::Error> {
     fits(grid, 4)?;
-    Ok(whole(
-        scene.assembly(),
-        grid,
-        Selection {
-            sdf: true,
-            ..Selection::default()
-        },
-        |b| &b.sdf,
-    ))
+    let selection = Selection {
+        sdf: true,
+        ..Selection::default()
+    };
+    let sampler = LayerSampler::new(scene.assembly(), grid, selection);
+    Ok(fresh(grid, |data| sampler.fill_signed_distance(data)))
 }
 
 /// Material id at each voxel's centre, 0 outside.

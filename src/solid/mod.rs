@@ -43,5 +43,5 @@ pub use turn::Turn;
 pub(crate) use assembly::{Reaches, signed};
 pub(crate) use body::VoxelShape;
 pub(crate) use fraction::TOLERANCE;
-pub(crate) use row::{Cuts, LayerCuts, Row};
+pub(crate) use row::{Cuts, LayerCuts, Ring, Row};
 pub(crate) use terms::{Factor, Term};

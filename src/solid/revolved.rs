@@ -84,6 +84,7 @@ impl Revolved {
         RowSurface {
             frame: &self.frame,
             turn: &self.turn,
+            section: &self.section,
             pieces: self.section.pieces(),
             tree: self.section.tree(),
         }
@@ -131,6 +132,23 @@ impl Revolved {
             [(e[0] * e[0] + e[1] * e[1]).sqrt(), e[2]]
         });
         side.min(turned)
+    }
+
+    /// The side of the turn that a point is on, whatever its place in the half-plane.
+    pub(crate) fn wedge_side(&self, point: DVec3) -> Side {
+        let Turn::Partial(wedge) = &self.turn else {
+            return Side::Inside;
+        };
+        let local = self.frame.to_local(point);
+        let flat = DVec2::new(local.point.x, local.point.y);
+        match wedge.contains(flat, local.error.x + local.error.y) {
+            Some(true) => Side::Inside,
+            Some(false) => Side::Outside,
+            None => {
+                let e = self.frame.to_local_exact(point);
+                wedge.side_exact([e[0], e[1]])
+            }
+        }
     }
 
     /// Whether the closed body holds the point.

@@ -13,8 +13,8 @@
 //! * a cap is met where the row meets its plane.
 
 use super::turn::Turn;
-use crate::math::{Dd, Real, Similarity};
-use crate::region::{BoxTree, Piece};
+use crate::math::{Dd, Real, Side, Similarity};
+use crate::region::{BoxTree, MeridianPoint, Piece, Section};
 use glam::{DVec2, DVec3};
 
 /// A row of `count` voxel centres from `first`, `step` apart along x, in scene units.
@@ -62,7 +62,7 @@ pub(crate) struct Cuts {
 }
 
 impl Cuts {
-    pub(super) fn reset(&mut self, count: usize) {
+    pub(crate) fn reset(&mut self, count: usize) {
         self.list.clear();
         #[allow(clippy::cast_possible_wrap, reason = "voxel counts are below 2^31")]
         let last = count as i64 - 1;
@@ -117,8 +117,18 @@ impl Cuts {
 pub(crate) struct RowSurface<'a> {
     pub(crate) frame: &'a Similarity,
     pub(crate) turn: &'a Turn,
+    pub(crate) section: &'a Section,
     pub(crate) pieces: &'a [Piece],
     pub(crate) tree: &'a BoxTree,
+}
+
+/// A part of a layer between two of its radii, the axis being the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ring {
+    /// Bracket of the outer radius, in the region's unit.
+    pub(crate) radius: [f64; 2],
+    /// The side of the points within the ring.
+    pub(crate) side: Side,
 }
 
 /// What the rows of one layer share.
@@ -139,7 +149,7 @@ pub(super) struct LocalRow {
 
 impl RowSurface<'_> {
     /// Whether the local height depends on grid z alone, to the last bit.
-    fn is_upright(&self) -> bool {
+    pub(crate) fn is_upright(&self) -> bool {
         let e3 = self.frame.axis_exact(2);
         e3[0] == Dd::ZERO && e3[1] == Dd::ZERO
     }
@@ -152,8 +162,8 @@ impl RowSurface<'_> {
         let z = self.frame.to_local_exact(point)[2];
         let zf = z.f64();
         let margin = 8.0 * f64::EPSILON;
-        let mut radii = Vec::new();
-        let mut add = |r: Dd| radii.push([r.f64() - margin, r.f64() + margin]);
+        let mut radii: Vec<[f64; 2]> = Vec::new();
+        let around = |r: Dd| [r.f64() - margin, r.f64() + margin];
         self.tree.visit(
             |b| zf >= b.min[1] - margin && zf <= b.max[1] + margin,
             |i| {
@@ -165,7 +175,7 @@ impl RowSurface<'_> {
                 }
                 for end in [piece.start, piece.end] {
                     if (end[1] - z).f64().abs() <= margin {
-                        add(end[0]);
+                        radii.push(around(end[0]));
                     }
                 }
                 let (low, high) = if piece.direction() > 0 {
@@ -174,13 +184,59 @@ impl RowSurface<'_> {
                     (piece.end[1], piece.start[1])
                 };
                 if z > low && z < high {
-                    add(piece.other_at(1, z));
+                    // Straight pieces are as quick in double-double.
+                    let quick = (piece.degree() > 1)
+                        .then(|| piece.bracket_at(1, z))
+                        .flatten();
+                    radii.push(quick.map_or_else(
+                        || around(piece.other_at(1, z)),
+                        |[a, b]| [a - margin, b + margin],
+                    ));
                 }
             },
         );
         radii.sort_by(|a, b| a[0].total_cmp(&b[0]));
         radii.dedup();
         LayerCuts::Radii(radii)
+    }
+
+    /// The rings between the radii of a layer that holds `point`, from the axis outwards; brackets that overlap
+    /// are one.
+    pub(crate) fn rings(&self, radii: &[[f64; 2]], point: DVec3) -> Vec<Ring> {
+        let z = self.frame.to_local_exact(point)[2];
+        let z_error = 2.0 * f64::EPSILON * z.f64().abs();
+        let mut rings: Vec<Ring> = Vec::with_capacity(radii.len());
+        let mut inner = 0.0_f64;
+        for &radius in radii {
+            if let Some(last) = rings.last_mut()
+                && radius[0] <= last.radius[1]
+            {
+                last.radius[1] = last.radius[1].max(radius[1]);
+                inner = last.radius[1];
+                continue;
+            }
+            let r = 0.5 * (inner + radius[0].max(inner));
+            let middle = MeridianPoint {
+                r,
+                z: z.f64(),
+                r_error: 0.0,
+                z_error,
+            };
+            let side = self.section.side(middle, || [Dd::of(r), z]);
+            rings.push(Ring { radius, side });
+            inner = radius[1];
+        }
+        rings
+    }
+
+    /// Collects where a row crosses the planes of the caps.
+    pub(crate) fn wedge_cuts(&self, row: &Row, cuts: &mut Cuts) {
+        let local = row.local(self.frame);
+        if let Turn::Partial(wedge) = self.turn {
+            for d in wedge.directions() {
+                local.plane_crossing(d, row.count, cuts);
+            }
+        }
     }
 
     /// Collects the cuts of one row.

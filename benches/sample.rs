@@ -1,0 +1,158 @@
+//! Filling a grid, against a plain fill of the same buffer and against the formula of a torus.
+//!
+//! ```text
+//!   prepare/SCENE             from the solid to a sampler with its tables
+//!   occupancy/SCENE/KERNEL    the whole grid, u8
+//!   slab/SCENE/KERNEL         the same through the layers' own buffers, with distances
+//!   sdf/SCENE/KERNEL          the whole grid, f32
+//!   band/SCENE/KERNEL         distances clamped to three voxels
+//!   exact/SCENE               distances by the exact path alone, of a few rows: what a voxel costs without tables
+//!   formula                   sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid
+//!   fill/TYPE                 what writing takes: the same buffers, the same threads
+//! ```
+//!
+//! Grids of 256 voxels along the longest side. Every answer is compared with the plain loops bit for bit, and at some
+//! voxels with the exact path, before it is timed.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use rayon::prelude::*;
+use std::hint::black_box;
+use voxlathe::Scene;
+use voxlathe::grid::GridSpec;
+use voxlathe::math::{Kernel, SimdLevel};
+use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
+
+const SIDE: u32 = 256;
+const SCENES: [&str; 2] = ["torus", "goblet"];
+
+fn kernels() -> Vec<(&'static str, Kernel)> {
+    [
+        ("scalar", SimdLevel::Scalar),
+        ("avx2", SimdLevel::Avx2),
+        ("avx512", SimdLevel::Avx512),
+    ]
+    .into_iter()
+    .filter_map(|(name, level)| Some((name, Kernel::new(level).ok()?)))
+    .collect()
+}
+
+fn load(name: &str) -> (Scene, GridSpec) {
+    let sets = [format!("grid.resolution={SIDE}")];
+    let scene = Scene::load_with(format!("scenes/{name}.toml"), &sets).expect("a shipped scene");
+    let grid = scene.grid().expect("a grid");
+    (scene, grid)
+}
+
+fn distances(band: Option<f64>) -> Selection {
+    Selection {
+        sdf: true,
+        band,
+        ..Selection::default()
+    }
+}
+
+fn filled(buffer: &mut [f32], value: f32) {
+    let part = buffer.len().div_ceil(rayon::current_num_threads());
+    buffer.par_chunks_mut(part).for_each(|p| p.fill(value));
+}
+
+/// The distance to the shipped torus, as anyone would write it.
+fn formula(grid: &GridSpec, out: &mut [f32]) {
+    let [nx, ny, _] = grid.dims();
+    let layers = out.par_chunks_mut(nx * ny).enumerate();
+    layers.for_each(|(k, layer)| {
+        for (j, row) in layer.chunks_mut(nx).enumerate() {
+            for (i, value) in row.iter_mut().enumerate() {
+                let p = grid.centre(i, j, k).as_vec3();
+                let ring = (p.x * p.x + p.y * p.y).sqrt() - 1.0;
+                *value = (ring * ring + p.z * p.z).sqrt() - 0.35;
+            }
+        }
+    });
+}
+
+/// Compares a filled buffer with the exact path at some voxels.
+fn check(scene: &Scene, grid: &GridSpec, occupancy: &[u8], sdf: &[f32]) {
+    let [nx, ny, _] = grid.dims();
+    let bound = 1e-4 * grid.spacing().min_element();
+    for n in (0..sdf.len()).step_by(sdf.len() / 997) {
+        let at = grid.centre(n % nx, n / nx % ny, n / (nx * ny));
+        assert_eq!(occupancy[n] != 0, scene.assembly().contains(at));
+        let exact = scene.assembly().signed_distance(at);
+        let ulp = f64::from(f32::EPSILON) * exact.abs();
+        assert!((f64::from(sdf[n]) - exact).abs() <= bound.max(2.0 * ulp));
+    }
+}
+
+fn sampling(c: &mut Criterion) {
+    for name in SCENES {
+        let (scene, grid) = load(name);
+        let n = usize::try_from(grid.voxel_count()).expect("small");
+        let (mut occupancy, mut sdf) = (vec![1_u8; n], vec![1.0_f32; n]);
+        let plain = Kernel::new(SimdLevel::Scalar).expect("always there");
+        let sampler = |kernel, band| {
+            LayerSampler::new(scene.assembly(), &grid, distances(band)).with_kernel(kernel)
+        };
+        sampler(plain, None).fill_occupancy(&mut occupancy);
+        sampler(plain, None).fill_signed_distance(&mut sdf);
+        check(&scene, &grid, &occupancy, &sdf);
+        let expected = (occupancy.clone(), sdf.clone());
+
+        let mut group = c.benchmark_group("sample");
+        group.sample_size(10);
+        group.bench_function(BenchmarkId::new("prepare", name), |b| {
+            b.iter(|| black_box(sampler(plain, None)));
+        });
+        group.throughput(Throughput::Elements(n as u64));
+        let band = 3.0 * grid.spacing().max_element();
+        for (level, kernel) in kernels() {
+            let (whole, narrow) = (sampler(kernel, None), sampler(kernel, Some(band)));
+            whole.fill_occupancy(&mut occupancy);
+            whole.fill_signed_distance(&mut sdf);
+            assert!(
+                occupancy == expected.0 && sdf == expected.1,
+                "{level} differs"
+            );
+            let id = |what: &str| BenchmarkId::new(format!("{what}/{name}"), level);
+            group.bench_function(id("occupancy"), |b| {
+                b.iter(|| whole.fill_occupancy(&mut occupancy))
+            });
+            group.bench_function(id("sdf"), |b| {
+                b.iter(|| whole.fill_signed_distance(&mut sdf))
+            });
+            group.bench_function(id("band"), |b| {
+                b.iter(|| narrow.fill_signed_distance(&mut sdf))
+            });
+            group.bench_function(id("slab"), |b| {
+                b.iter(|| {
+                    let layers = (0..grid.dims()[2]).into_par_iter();
+                    layers.for_each_init(LayerBuffers::default, |buffers, k| {
+                        whole.sample(k, buffers);
+                        black_box(&*buffers);
+                    });
+                });
+            });
+        }
+        if name == "torus" {
+            group.bench_function("formula", |b| b.iter(|| formula(&grid, &mut sdf)));
+        }
+        group.bench_function(BenchmarkId::new("fill/f32", name), |b| {
+            b.iter(|| filled(&mut sdf, black_box(2.0)));
+        });
+        let [nx, ny, nz] = grid.dims();
+        group.throughput(Throughput::Elements(nx as u64));
+        group.bench_function(BenchmarkId::new("exact", name), |b| {
+            let mut j = 0;
+            b.iter(|| {
+                j = (j + 1) % ny;
+                let row =
+                    (0..nx).map(|i| scene.assembly().signed_distance(grid.centre(i, j, nz / 2)));
+                black_box(row.sum::<f64>())
+            });
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, sampling);
+criterion_main!(benches);

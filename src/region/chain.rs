@@ -1,0 +1,342 @@
+//! The boundary of a region as arcs in their order, with the corners between them.
+//!
+//! Every feature answers in closed form. Points nearest to an arc lie between the normals at its ends; those
+//! nearest to a corner between the normals of the arcs that meet there. Along a run of features whose normals
+//! do not cross within a box, the nearest feature of a point of the box is found by walking, and the signed
+//! distance is smooth but for jumps of its second derivative where one feature hands over to the next.
+//!
+//! ```text
+//!   arc      sdf = -u / (1 + S),   u = 2 n · q - κ |q|²,  S = sqrt(1 - κ u),   q from the arc's start
+//!            gradient (κ q - n) / S,   second derivative along a unit vector e:  κ / S (1 - (e · gradient)²)
+//!   corner   sdf = ±|q|
+//! ```
+//!
+//! The region lies on the left of every arc, so the distance is negative there.
+
+use super::arcs::{Arc, arcs, cross, dot, minus};
+use super::boundary::BoundaryPiece;
+use std::collections::HashMap;
+
+/// An arc, or a corner between two.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Feature {
+    arc: Arc,
+    /// 0 for an arc; for a corner +1 where it is nearest to points outside, -1 inside.
+    corner: f64,
+    before: u32,
+    after: u32,
+}
+
+/// Nothing follows, and points beyond are not accounted for.
+const OPEN: u32 = u32::MAX;
+/// Nothing follows, and no point of the half-plane is beyond.
+const AXIS: u32 = u32::MAX - 1;
+
+/// Arcs in order, with their corners.
+#[derive(Debug, Clone)]
+pub(crate) struct Chain {
+    features: Vec<Feature>,
+}
+
+/// A signed distance with its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Local {
+    /// The signed distance.
+    pub(crate) value: f64,
+    /// Its gradient, a unit vector.
+    pub(crate) gradient: [f64; 2],
+    /// Its curvature across the gradient.
+    pub(crate) bend: f64,
+}
+
+/// Sine of the angle below which two tangents count as one: the distance errs by its square.
+const SMOOTH: f64 = 1e-7;
+/// Least share of the radius of curvature that a box keeps from the centre, on the hollow side.
+const CLEAR: f64 = 0.05;
+
+impl Chain {
+    /// The boundary in arcs within `tolerance`; `None` where it takes more than `most`. Without `mirrored`, points
+    /// at r < 0 count too; with it, what ends on the axis goes on as its mirror image.
+    pub(crate) fn new(
+        boundary: &[BoundaryPiece],
+        tolerance: f64,
+        most: usize,
+        mirrored: bool,
+    ) -> Option<Self> {
+        let mut all = Vec::new();
+        for piece in boundary {
+            if !arcs(piece, tolerance, most.saturating_sub(all.len()), &mut all) {
+                return None;
+            }
+        }
+        Some(Self::linked(&all, mirrored))
+    }
+
+    fn linked(all: &[Arc], mirrored: bool) -> Self {
+        let key = |p: [f64; 2]| p.map(|c| (c + 0.0).to_bits());
+        // The arcs that start and that end at a point.
+        let mut meeting: HashMap<[u64; 2], [Vec<u32>; 2]> = HashMap::new();
+        for (i, arc) in (0_u32..).zip(all) {
+            meeting.entry(key(arc.start)).or_default()[0].push(i);
+            meeting.entry(key(arc.end)).or_default()[1].push(i);
+        }
+        let mut features: Vec<Feature> = (all.iter())
+            .map(|&arc| Feature {
+                arc,
+                corner: 0.0,
+                before: OPEN,
+                after: OPEN,
+            })
+            .collect();
+        let add_corner =
+            |features: &mut Vec<Feature>, at: [f64; 2], from: [f64; 2], to: [f64; 2]| {
+                let turn = cross(from, to);
+                let id = u32::try_from(features.len()).unwrap_or(OPEN);
+                features.push(Feature {
+                    arc: Arc {
+                        start: at,
+                        end: at,
+                        from,
+                        to,
+                        curvature: 0.0,
+                    },
+                    corner: turn.signum(),
+                    before: AXIS,
+                    after: AXIS,
+                });
+                id
+            };
+        for (i, arc) in (0_u32..).zip(all) {
+            // What goes on from the end.
+            let [starting, ending] = &meeting[&key(arc.end)];
+            if let ([next], [_]) = (starting.as_slice(), ending.as_slice()) {
+                let (from, to) = (arc.to, all[*next as usize].from);
+                let turn = cross(from, to);
+                if turn.abs() <= SMOOTH {
+                    if dot(from, to) > 0.0 {
+                        features[i as usize].after = *next;
+                        features[*next as usize].before = i;
+                    }
+                    // A cusp is left open.
+                    continue;
+                }
+                let corner = add_corner(&mut features, arc.end, from, to);
+                features[corner as usize].before = i;
+                features[corner as usize].after = *next;
+                features[i as usize].after = corner;
+                features[*next as usize].before = corner;
+            } else if mirrored && arc.end[0] == 0.0 && starting.is_empty() && ending.len() == 1 {
+                let mirror = [arc.to[0], -arc.to[1]];
+                features[i as usize].after = if arc.to[1].abs() <= SMOOTH {
+                    AXIS
+                } else {
+                    let corner = add_corner(&mut features, arc.end, arc.to, mirror);
+                    features[corner as usize].before = i;
+                    corner
+                };
+            }
+        }
+        for (i, arc) in (0_u32..).zip(all) {
+            let [starting, ending] = &meeting[&key(arc.start)];
+            if mirrored && arc.start[0] == 0.0 && ending.is_empty() && starting.len() == 1 {
+                let mirror = [arc.from[0], -arc.from[1]];
+                features[i as usize].before = if arc.from[1].abs() <= SMOOTH {
+                    AXIS
+                } else {
+                    let corner = add_corner(&mut features, arc.start, mirror, arc.from);
+                    features[corner as usize].after = i;
+                    corner
+                };
+            }
+        }
+        Self { features }
+    }
+
+    /// Number of features.
+    pub(crate) fn len(&self) -> usize {
+        self.features.len()
+    }
+
+    /// Unsigned distance from a point to a feature.
+    #[inline]
+    pub(crate) fn distance(&self, feature: u32, q: [f64; 2]) -> f64 {
+        let f = &self.features[feature as usize];
+        let a = minus(q, f.arc.start);
+        if f.corner != 0.0 {
+            return a[0].hypot(a[1]);
+        }
+        let b = minus(q, f.arc.end);
+        if dot(f.arc.from, a) >= 0.0 && dot(f.arc.to, b) <= 0.0 {
+            let (u, s) = f.arc.offset(a);
+            (u / (1.0 + s)).abs()
+        } else {
+            dot(a, a).min(dot(b, b)).sqrt()
+        }
+    }
+
+    /// The signed distance to what a feature is part of: the whole circle or line, or the corner.
+    #[inline]
+    pub(crate) fn local(&self, feature: u32, q: [f64; 2]) -> Local {
+        let f = &self.features[feature as usize];
+        let a = minus(q, f.arc.start);
+        if f.corner != 0.0 {
+            let length = a[0].hypot(a[1]).max(f64::MIN_POSITIVE);
+            return Local {
+                value: f.corner * length,
+                gradient: a.map(|c| f.corner * c / length),
+                bend: f.corner / length,
+            };
+        }
+        let (u, s) = f.arc.offset(a);
+        let inverse = 1.0 / s.max(f64::MIN_POSITIVE);
+        let k = f.arc.curvature;
+        Local {
+            value: -u / (1.0 + s),
+            gradient: [
+                (k * a[0] + f.arc.from[1]) * inverse,
+                (k * a[1] - f.arc.from[0]) * inverse,
+            ],
+            bend: k * inverse,
+        }
+    }
+
+    /// The feature nearest to a point, walking from another of the same smooth run.
+    #[inline]
+    pub(crate) fn walk(&self, mut feature: u32, q: [f64; 2]) -> u32 {
+        let start = feature;
+        let mut steps = self.features.len();
+        while let Some(next) = self.beyond(feature, q)
+            && steps > 0
+        {
+            feature = next;
+            steps -= 1;
+        }
+        if feature != start {
+            return feature;
+        }
+        while let Some(next) = self.short_of(feature, q)
+            && steps > 0
+        {
+            feature = next;
+            steps -= 1;
+        }
+        feature
+    }
+
+    /// What follows a feature, where the point is beyond its end.
+    #[inline]
+    fn beyond(&self, feature: u32, q: [f64; 2]) -> Option<u32> {
+        let f = &self.features[feature as usize];
+        (f.after < AXIS && dot(f.arc.to, minus(q, f.arc.end)) > 0.0).then_some(f.after)
+    }
+
+    /// What comes before a feature, where the point is short of its start.
+    #[inline]
+    fn short_of(&self, feature: u32, q: [f64; 2]) -> Option<u32> {
+        let f = &self.features[feature as usize];
+        (f.before < AXIS && dot(f.arc.from, minus(q, f.arc.start)) < 0.0).then_some(f.before)
+    }
+
+    /// The neighbour of a feature on the way to another that is a few features away.
+    pub(crate) fn towards(&self, feature: u32, to: u32) -> Option<u32> {
+        const REACH: usize = 4;
+        let follow = |step: fn(&Feature) -> u32| {
+            let mut at = feature;
+            for _ in 0..REACH {
+                at = step(&self.features[at as usize]);
+                if at == to {
+                    return true;
+                }
+                if at >= AXIS {
+                    return false;
+                }
+            }
+            false
+        };
+        let f = &self.features[feature as usize];
+        if follow(|f| f.after) {
+            Some(f.after)
+        } else if follow(|f| f.before) {
+            Some(f.before)
+        } else {
+            None
+        }
+    }
+
+    /// The features of `list`, which rises, in runs that follow each other; `None` where some go round in a ring.
+    pub(crate) fn runs(&self, list: &[u32]) -> Option<Vec<Vec<u32>>> {
+        let holds = |i: u32| i < AXIS && list.binary_search(&i).is_ok();
+        let mut runs = Vec::new();
+        let mut seen = 0;
+        for &first in list
+            .iter()
+            .filter(|i| !holds(self.features[**i as usize].before))
+        {
+            let mut run = vec![first];
+            let mut next = self.features[first as usize].after;
+            while holds(next) {
+                run.push(next);
+                next = self.features[next as usize].after;
+            }
+            seen += run.len();
+            runs.push(run);
+        }
+        (seen == list.len()).then_some(runs)
+    }
+
+    /// Whether every point of a box (its corners are given) has one stationary feature of a run at most, found by
+    /// walking, if the one nearest to it is in the run.
+    pub(crate) fn is_smooth(&self, run: &[u32], corners: &[[f64; 2]; 4]) -> bool {
+        let last = run.len() - 1;
+        run.iter().enumerate().all(|(n, &i)| {
+            let f = &self.features[i as usize];
+            let least = |t: [f64; 2], p: [f64; 2]| {
+                (corners.iter()).fold(f64::INFINITY, |m, q| m.min(dot(t, minus(*q, p))))
+            };
+            let most = |t: [f64; 2], p: [f64; 2]| -least(t.map(|c| -c), p);
+            if f.before == OPEN && least(f.arc.from, f.arc.start) < 0.0
+                || f.after == OPEN && most(f.arc.to, f.arc.end) > 0.0
+            {
+                return false;
+            }
+            if f.corner != 0.0 {
+                if n == 0 || n == last {
+                    return true;
+                }
+                // No point may be short of the corner by one arc and beyond it by the other.
+                let at = f.arc.start;
+                let outward = [f.arc.from, f.arc.to];
+                // The sum of the right normals, turned to the side from which the corner is seen.
+                let fan = [
+                    outward[0][1] + outward[1][1],
+                    -outward[0][0] - outward[1][0],
+                ];
+                return least(f.arc.from, at) >= 0.0
+                    || most(f.arc.to, at) <= 0.0
+                    || least(fan.map(|c| c * f.corner), at) >= 0.0;
+            }
+            // The squared distance along the arc falls or rises all the way for every point of the box,
+            if least(f.arc.from, f.arc.start) > 0.0 && least(f.arc.to, f.arc.end) > 0.0
+                || most(f.arc.from, f.arc.start) < 0.0 && most(f.arc.to, f.arc.end) < 0.0
+            {
+                return true;
+            }
+            // or its second derivative 1 - κ n · (q - C) is positive, so that it turns from falling to rising.
+            let k = f.arc.curvature;
+            let clear = |t: [f64; 2], p: [f64; 2]| {
+                let normal = [-k * t[1], k * t[0]];
+                1.0 - most(normal, p) >= CLEAR
+            };
+            k == 0.0 || clear(f.arc.from, f.arc.start) && clear(f.arc.to, f.arc.end)
+        })
+    }
+}
+
+impl Arc {
+    /// u and S of the module's formula, `q` relative to the start.
+    #[inline]
+    fn offset(&self, q: [f64; 2]) -> (f64, f64) {
+        let u = 2.0 * cross(self.from, q) - self.curvature * dot(q, q);
+        (u, (1.0 - self.curvature * u).max(0.0).sqrt())
+    }
+}

@@ -1,0 +1,247 @@
+//! Where in the half-plane the distance to a region's boundary is smooth, as a quadtree.
+//!
+//! A cell keeps the features that may be nearest to one of its points: with `c` its centre and `ρ` half its
+//! diagonal, those no further from `c` than the nearest one plus 2 ρ, since no distance changes faster than the
+//! point moves. They form runs that follow each other along the boundary. A cell is a leaf when it has one run and
+//! that is smooth in it ([`Chain::is_smooth`]); or a few such, between which the distance has a ridge, and is small;
+//! or when it is as small as cells become.
+//!
+//! Lengths are in the region's unit. Cells are counted from `first` in units of the smallest.
+
+use super::chain::Chain;
+
+/// A quadtree over a rectangle of the half-plane.
+#[derive(Debug, Clone)]
+pub(crate) struct MeridianField {
+    chain: Chain,
+    /// Side of the smallest cells.
+    cell: f64,
+    /// Corner of the rectangle, in cells from (0, `base`).
+    first: [i64; 2],
+    /// Height of the lattice's origin.
+    base: f64,
+    /// The rectangle in cells.
+    size: [u32; 2],
+    /// The root is 2^levels cells wide.
+    levels: u32,
+    root: Node,
+    /// The four quarters of each node that has any.
+    quarters: Vec<[Node; 4]>,
+    leaves: Vec<Leaf>,
+    /// The leaves' features.
+    pool: Vec<u32>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Node {
+    Quarters(u32),
+    Leaf(u32),
+    /// Outside the rectangle.
+    Empty,
+}
+
+/// A cell that is not divided.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Leaf {
+    start: u32,
+    len: u32,
+    /// Whether the features kept are one of each of its smooth runs, from which walking finds that run's nearest;
+    /// else they are all that may be nearest.
+    pub(crate) smooth: bool,
+}
+
+/// The part of the half-plane that a field covers, in the region's unit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Extent {
+    /// Least and greatest r.
+    pub(crate) r: [f64; 2],
+    /// Least and greatest z.
+    pub(crate) z: [f64; 2],
+    /// Side of the smallest cells.
+    pub(crate) cell: f64,
+}
+
+/// The most runs of a leaf.
+pub(crate) const MOST_RUNS: usize = 4;
+/// Levels up to which a cell may have as many runs as the place in the list, from one run on.
+const LEVELS_OF_RUNS: [u32; MOST_RUNS] = [u32::MAX, 3, 2, 1];
+/// The most cells along a side of the rectangle.
+pub(crate) const MOST_CELLS: f64 = 32_768.0;
+
+impl MeridianField {
+    /// The field of a boundary over `extent`; `None` where that has too many cells.
+    pub(crate) fn new(chain: Chain, extent: Extent) -> Option<Self> {
+        let Extent { r, z, cell } = extent;
+        let first_r = (r[0] / cell).floor();
+        let counts = [
+            (r[1] / cell).floor() - first_r + 1.0,
+            ((z[1] - z[0]) / cell).floor() + 1.0,
+        ];
+        if !(counts.iter().all(|c| *c <= MOST_CELLS) && first_r.abs() <= MOST_CELLS)
+            || chain.len() == 0
+        {
+            return None;
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked just now"
+        )]
+        let (size, first) = (counts.map(|c| c as u32), [first_r as i64, 0]);
+        let widest = size[0].max(size[1]);
+        let mut field = Self {
+            chain,
+            cell,
+            first,
+            base: z[0],
+            size,
+            levels: widest.next_power_of_two().ilog2(),
+            root: Node::Empty,
+            quarters: Vec::new(),
+            leaves: Vec::new(),
+            pool: Vec::new(),
+        };
+        let all: Vec<u32> = (0_u32..).take(field.chain.len()).collect();
+        field.root = field.node([0, 0], field.levels, &all);
+        Some(field)
+    }
+
+    /// The boundary's features.
+    pub(crate) fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// Side of the smallest cells.
+    pub(crate) fn cell(&self) -> f64 {
+        self.cell
+    }
+
+    /// Cells along r, and the first of them counted from r = 0.
+    pub(crate) fn columns(&self) -> (usize, i64) {
+        (self.size[0] as usize, self.first[0])
+    }
+
+    /// The features kept of a leaf.
+    pub(crate) fn features(&self, leaf: &Leaf) -> &[u32] {
+        &self.pool[leaf.start as usize..(leaf.start + leaf.len) as usize]
+    }
+
+    /// A leaf by its number.
+    pub(crate) fn leaf(&self, number: u32) -> &Leaf {
+        &self.leaves[number as usize]
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+    fn corner(&self, at: [u32; 2]) -> [f64; 2] {
+        [
+            (self.first[0] + i64::from(at[0])) as f64 * self.cell,
+            self.base + f64::from(at[1]) * self.cell,
+        ]
+    }
+
+    /// The node whose lower corner is cell `at`, 2^level cells wide, of the features in `list`.
+    fn node(&mut self, at: [u32; 2], level: u32, list: &[u32]) -> Node {
+        if at[0] >= self.size[0] || at[1] >= self.size[1] {
+            return Node::Empty;
+        }
+        let side = f64::from(1_u32 << level) * self.cell;
+        let low = self.corner(at);
+        let centre = low.map(|c| c + 0.5 * side);
+        // A hair more covers the rounding of the distances.
+        let radius = side * (0.5_f64.sqrt() * (1.0 + 1e-9)) + 1e-14;
+        let mut nearest = f64::INFINITY;
+        let distances: Vec<f64> = (list.iter())
+            .map(|&i| {
+                let d = self.chain.distance(i, centre);
+                nearest = nearest.min(d);
+                d
+            })
+            .collect();
+        let limit = nearest + 2.0 * radius;
+        let kept: Vec<u32> = (list.iter().zip(&distances))
+            .filter(|(_, d)| **d <= limit)
+            .map(|(i, _)| *i)
+            .collect();
+        let corners = [
+            low,
+            [low[0] + side, low[1]],
+            [low[0], low[1] + side],
+            [low[0] + side, low[1] + side],
+        ];
+        if let Some(runs) = self.chain.runs(&kept)
+            && runs.len() <= MOST_RUNS
+            && level <= LEVELS_OF_RUNS[runs.len() - 1]
+            && runs.iter().all(|run| self.chain.is_smooth(run, &corners))
+        {
+            let middles: Vec<u32> = runs.iter().map(|run| run[run.len() / 2]).collect();
+            return self.add_leaf(&middles, true);
+        }
+        if level == 0 {
+            return self.add_leaf(&kept, false);
+        }
+        let half = 1 << (level - 1);
+        let quarters = [0, 1, 2, 3].map(|q: u32| {
+            let corner = [at[0] + (q & 1) * half, at[1] + (q >> 1) * half];
+            self.node(corner, level - 1, &kept)
+        });
+        self.quarters.push(quarters);
+        Node::Quarters(u32::try_from(self.quarters.len() - 1).unwrap_or(u32::MAX))
+    }
+
+    fn add_leaf(&mut self, list: &[u32], smooth: bool) -> Node {
+        let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let leaf = Leaf {
+            start: number(self.pool.len()),
+            len: number(list.len()),
+            smooth,
+        };
+        self.pool.extend_from_slice(list);
+        self.leaves.push(leaf);
+        Node::Leaf(number(self.leaves.len() - 1))
+    }
+
+    /// Calls `each(first, last, leaf)` for the leaves at height `z`, in the order of r; `first..last` are
+    /// the columns of cells each covers.
+    pub(crate) fn leaves_at(&self, z: f64, each: &mut impl FnMut(usize, usize, u32)) {
+        let row = ((z - self.base) / self.cell).floor();
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the rectangle"
+        )]
+        let row = row.clamp(0.0, f64::from(self.size[1] - 1)) as u32;
+        self.visit(self.root, 0, self.levels, row, each);
+    }
+
+    fn visit(
+        &self,
+        node: Node,
+        column: u32,
+        level: u32,
+        row: u32,
+        each: &mut impl FnMut(usize, usize, u32),
+    ) {
+        match node {
+            Node::Empty => {}
+            Node::Leaf(leaf) => {
+                let last = (column + (1 << level)).min(self.size[0]);
+                each(column as usize, last as usize, leaf);
+            }
+            Node::Quarters(index) => {
+                let half = 1 << (level - 1);
+                let upper = (row >> (level - 1)) & 1;
+                let [a, b] =
+                    [0, 1].map(|q| self.quarters[index as usize][(2 * upper + q) as usize]);
+                self.visit(a, column, level - 1, row, each);
+                self.visit(b, column + half, level - 1, row, each);
+            }
+        }
+    }
+
+    /// How many leaves there are, and how many of them are smooth.
+    #[cfg(test)]
+    pub(crate) fn census(&self) -> (usize, usize) {
+        let smooth = self.leaves.iter().filter(|l| l.smooth);
+        (self.leaves.len(), smooth.count())
+    }
+}

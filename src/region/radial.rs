@@ -1,0 +1,503 @@
+//! The signed distance along one height, as cubics in r.
+//!
+//! Every cell of a [`MeridianField`]'s lattice gets the cubic that has the distance and its slope at both ends.
+//! Where one feature answers for the whole cell the error of that is
+//!
+//! ```text
+//!   |error| <= h⁴ / 384 · max |d⁗|,    |d⁗| <= 3 b³    b the bend, 1 / distance from the centre of curvature
+//! ```
+//!
+//! and where features hand over within it, each jump J of the second derivative adds at most `h² J / 60` and each
+//! jump K of the third at most `h³ K / 192` (the Peano kernel of cubic Hermite interpolation, a clamped beam, and
+//! its slope). Cells that may err by more than the tolerance, and those where the distance is not smooth, have NaN
+//! as their first coefficient and are [`mended`](RadialTable::mended) voxel by voxel.
+//!
+//! Source of d⁗: `d = ρ - R` with ρ the distance from the centre, differentiated along a line: `d″ = b τ²`,
+//! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
+
+use super::chain::Local;
+use super::field::{MOST_RUNS, MeridianField};
+
+/// Cubics over the cells of one height.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RadialTable {
+    /// Coefficients of 1, t, t² and t³ over each cell, t from 0 to 1, and last what the first of them lost in rounding.
+    pub(crate) coefficients: [Vec<f32>; 5],
+    leaves: Vec<u32>,
+    height: f64,
+    scale: f64,
+}
+
+/// Cells read beyond the last one by lanes that do not use them.
+pub(crate) const PADDING: usize = 32;
+/// Features that may follow each other within one cell.
+const MOST_JOINTS: usize = 4;
+/// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
+const SAME_BEND: f64 = 1e-9;
+/// Largest bend times cell side for which the bounds' variation over the cell is accounted.
+const BENT: f64 = 0.25;
+
+impl RadialTable {
+    /// Tabulates height `z` of a field whose unit is `scale` scene units, within `tolerance` region units.
+    pub(crate) fn fill(&mut self, field: &MeridianField, z: f64, scale: f64, tolerance: f64) {
+        let (columns, first) = field.columns();
+        for c in &mut self.coefficients {
+            c.clear();
+            c.resize(columns + PADDING, 0.0);
+        }
+        self.leaves.clear();
+        self.leaves.resize(columns, 0);
+        self.height = z;
+        self.scale = scale;
+        let cell = field.cell();
+        #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+        let node = |k: usize| (first + k as i64) as f64 * cell;
+        field.leaves_at(z, &mut |from, to, number| {
+            self.leaves[from..to].fill(number);
+            let leaf = field.leaf(number);
+            let features = field.features(leaf);
+            match (leaf.smooth, features.len()) {
+                (false, _) => self.coefficients[0][from..to].fill(f32::NAN),
+                (true, 1) => {
+                    let mut near = Foot::new(field, features[0], [node(from), z]);
+                    for k in from..to {
+                        let far = Foot::new(field, near.feature, [node(k + 1), z]);
+                        let good = error(field, [&near, &far], [node(k + 1), z]) <= tolerance;
+                        self.put(k, good, [&near.local, &far.local], cell * scale);
+                        near = far;
+                    }
+                }
+                (true, _) => self.ridge(field, (from, to), z, features, tolerance, &node),
+            }
+        });
+    }
+
+    /// Tabulates a leaf of several runs.
+    fn ridge(
+        &mut self,
+        field: &MeridianField,
+        (from, to): (usize, usize),
+        z: f64,
+        runs: &[u32],
+        tolerance: f64,
+        node: &impl Fn(usize) -> f64,
+    ) {
+        let h = field.cell();
+        let at = |starts: &[Foot], k: usize| -> Feet {
+            let q = [node(k), z];
+            starts
+                .iter()
+                .map(|f| Foot::new(field, f.feature, q))
+                .collect()
+        };
+        let mut near: Feet = (runs.iter().map(|&f| Foot::new(field, f, [node(from), z]))).collect();
+        for k in from..to {
+            let far = at(&near, k + 1);
+            let size = |f: &Foot| f.local.value.abs();
+            let nearest = |feet: &Feet| {
+                (0..feet.len()).fold(0, |m, i| {
+                    if size(&feet[i]) < size(&feet[m]) {
+                        i
+                    } else {
+                        m
+                    }
+                })
+            };
+            let first = nearest(&near);
+            // The differences to the others are linear but for the bends, where no other surface is crossed: they
+            // keep their sign where they have it at both ends by more than those.
+            let q = [node(k + 1), z];
+            let bend = |i: usize| {
+                let passage = Passage::new(field, [&near[i], &far[i]], q);
+                passage.map_or(f64::INFINITY, |p| p.bend)
+            };
+            let own = bend(first);
+            let clear = (0..near.len()).filter(|i| *i != first).all(|i| {
+                let gap = |feet: &Feet| size(&feet[i]) - size(&feet[first]);
+                let bent = h * (bend(i) + own);
+                near[i].local.value * far[i].local.value > 0.0
+                    && bent <= BENT
+                    && gap(&near).min(gap(&far)) > 0.25 * h * bent
+            });
+            let (a, b) = (&near[first], &far[first]);
+            let good = clear && error(field, [a, b], q) <= tolerance;
+            self.put(k, good, [&a.local, &b.local], h * self.scale);
+            near = far;
+        }
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "coefficients are f32: the stored voxels are"
+    )]
+    fn put(&mut self, k: usize, good: bool, [near, far]: [&Local; 2], length: f64) {
+        if !good {
+            self.coefficients[0][k] = f32::NAN;
+            return;
+        }
+        let scale = self.scale;
+        let (a, b) = (near.value * scale, far.value * scale);
+        let (da, db) = (near.gradient[0] * length, far.gradient[0] * length);
+        let rise = b - a;
+        let lost = a - f64::from(a as f32);
+        let cubic = [
+            a,
+            da,
+            3.0 * rise - 2.0 * da - db,
+            da + db - 2.0 * rise,
+            lost,
+        ];
+        for (c, v) in self.coefficients.iter_mut().zip(cubic) {
+            c[k] = v as f32;
+        }
+    }
+
+    /// The unsigned distance in scene units at `r` region units in a cell without a cubic.
+    pub(crate) fn mended(&self, field: &MeridianField, cell: usize, r: f64) -> f64 {
+        let leaf = field.leaf(self.leaves[cell]);
+        let (chain, q) = (field.chain(), [r, self.height]);
+        let distances = field.features(leaf).iter().map(|&i| {
+            if leaf.smooth {
+                chain.local(chain.walk(i, q), q).value.abs()
+            } else {
+                chain.distance(i, q)
+            }
+        });
+        distances.fold(f64::INFINITY, f64::min) * self.scale
+    }
+}
+
+/// The nearest feature of a run, with its distance.
+#[derive(Debug, Clone, Copy)]
+struct Foot {
+    feature: u32,
+    local: Local,
+}
+
+type Feet = smallvec::SmallVec<[Foot; MOST_RUNS]>;
+
+impl Foot {
+    #[inline]
+    fn new(field: &MeridianField, from: u32, q: [f64; 2]) -> Self {
+        let feature = field.chain().walk(from, q);
+        Self {
+            feature,
+            local: field.chain().local(feature, q),
+        }
+    }
+}
+
+/// What happens between the feet of two neighbouring nodes.
+struct Passage {
+    /// The largest bend of the features passed.
+    bend: f64,
+    /// Sums of the jumps of the second and of the third derivative.
+    jumps: [f64; 2],
+}
+
+impl Passage {
+    /// From one foot to the next, which is that of `q`; `None` where more features are passed than are followed.
+    #[inline]
+    fn new(field: &MeridianField, [near, far]: [&Foot; 2], q: [f64; 2]) -> Option<Self> {
+        let mut found = Self {
+            bend: near.local.bend.abs().max(far.local.bend.abs()),
+            jumps: [0.0; 2],
+        };
+        if near.feature == far.feature {
+            return Some(found);
+        }
+        let (h, chain) = (field.cell(), field.chain());
+        let (mut feature, mut last) = (near.feature, chain.local(near.feature, q).bend);
+        for _ in 0..MOST_JOINTS {
+            feature = chain.towards(feature, far.feature)?;
+            let bend = chain.local(feature, q).bend;
+            let (difference, widest) = ((bend - last).abs(), bend.abs().max(last.abs()));
+            found.bend = found.bend.max(widest);
+            // Else they are parts of one circle.
+            if difference > SAME_BEND * widest {
+                // Both bends are taken at the far end; on the way from the joint they drift by b² h each, which
+                // cancels but for their difference, and by terms in b³.
+                let b = widest / (1.0 - BENT);
+                found.jumps[0] += difference * (1.0 + 3.0 * h * b) + 6.0 * h * h * b.powi(3);
+                found.jumps[1] += 2.4 * b * difference + 24.0 * h * b.powi(3);
+            }
+            if feature == far.feature {
+                return Some(found);
+            }
+            last = bend;
+        }
+        None
+    }
+
+    /// A bound on the error of the cubic over a cell of side `h`.
+    fn error(&self, h: f64) -> f64 {
+        let [second, third] = self.jumps;
+        smooth_error(h, self.bend) + h * h * second / 60.0 + h.powi(3) * third / 192.0
+    }
+}
+
+/// A bound on the error of one cell's cubic, whose far end is `q`.
+#[inline]
+fn error(field: &MeridianField, feet: [&Foot; 2], q: [f64; 2]) -> f64 {
+    Passage::new(field, feet, q).map_or(f64::INFINITY, |p| p.error(field.cell()))
+}
+
+/// The error over a cell of side `h` where the bend at its ends is at most `bend`.
+fn smooth_error(h: f64, bend: f64) -> f64 {
+    if bend * h > BENT {
+        return f64::INFINITY;
+    }
+    // The centre of curvature may be nearer by the cell's side.
+    let b = bend / (1.0 - bend * h);
+    (h * b).powi(3) * h / 128.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::region::{
+        Boundary, BoundaryPiece, Chain, DistanceSet, Extent, Fill, MeridianField, ProfileCurve,
+        ProfileLoop, Region,
+    };
+
+    fn polyline(points: &[[f64; 2]]) -> ProfileCurve {
+        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+        let mut knots: Vec<f64> = (0..points.len()).map(|i| i as f64).collect();
+        knots.insert(0, 0.0);
+        knots.push(knots[knots.len() - 1]);
+        ProfileCurve::Nurbs {
+            degree: 1,
+            knots,
+            points: points.to_vec(),
+            weights: vec![1.0; points.len()],
+        }
+    }
+
+    fn cubic(points: &[[f64; 2]], weights: &[f64]) -> ProfileCurve {
+        let inner = points.len() - 4;
+        let mut knots = vec![0.0; 4];
+        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+        knots.extend((1..=inner).map(|i| i as f64));
+        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+        knots.extend([(inner + 1) as f64; 4]);
+        ProfileCurve::Nurbs {
+            degree: 3,
+            knots,
+            points: points.to_vec(),
+            weights: weights.to_vec(),
+        }
+    }
+
+    fn arc(center: [f64; 2], radii: [f64; 2], from: f64, to: f64) -> ProfileCurve {
+        ProfileCurve::Arc {
+            center,
+            radii,
+            tilt: 20.0,
+            from,
+            to,
+        }
+    }
+
+    /// Profiles with arcs, free curves, inflections, corners of both kinds, tips on the axis and thin walls.
+    fn regions() -> Vec<(&'static str, Region)> {
+        let region = |loops: &[ProfileLoop], boundary| {
+            Region::new(loops, boundary, Fill::EvenOdd).expect("a region")
+        };
+        let star: Vec<[f64; 2]> = (0..=10)
+            .map(|i| {
+                let (s, c) = (f64::from(i % 10) * 36.0).to_radians().sin_cos();
+                let r = if i % 2 == 0 { 1.0 } else { 0.45 };
+                [1.5 + r * c, r * s]
+            })
+            .collect();
+        let weights = [1.0, 3.0, 0.4, 1.0, 2.0, 1.0];
+        vec![
+            (
+                "tube",
+                region(
+                    &[vec![arc([1.0, 0.0], [0.35; 2], 0.0, 360.0)]],
+                    Boundary::Closed,
+                ),
+            ),
+            ("star", region(&[vec![polyline(&star)]], Boundary::Closed)),
+            (
+                "cone",
+                region(
+                    &[vec![polyline(&[[0.0, 0.0], [0.7, 0.2], [0.0, 1.0]])]],
+                    Boundary::ToAxis,
+                ),
+            ),
+            (
+                "goblet",
+                region(
+                    &[vec![
+                        polyline(&[[0.0, 0.0], [34.0, 0.0], [34.0, 3.0]]),
+                        cubic(
+                            &[
+                                [34.0, 3.0],
+                                [16.0, 5.0],
+                                [4.0, 6.0],
+                                [4.0, 22.0],
+                                [4.5, 40.0],
+                                [3.5, 62.0],
+                            ],
+                            &weights,
+                        ),
+                        cubic(
+                            &[
+                                [3.5, 62.0],
+                                [20.0, 66.0],
+                                [39.0, 78.0],
+                                [44.0, 108.0],
+                                [40.0, 140.0],
+                                [33.0, 170.0],
+                            ],
+                            &[1.0; 6],
+                        ),
+                        polyline(&[[33.0, 170.0], [32.0, 170.0]]),
+                        cubic(
+                            &[
+                                [32.0, 170.0],
+                                [38.5, 140.0],
+                                [42.0, 108.0],
+                                [37.0, 80.0],
+                                [18.0, 69.0],
+                                [0.0, 68.0],
+                            ],
+                            &[1.0; 6],
+                        ),
+                    ]],
+                    Boundary::ToAxis,
+                ),
+            ),
+            (
+                "ellipses",
+                region(
+                    &[
+                        vec![arc([2.0, 0.0], [1.0, 0.3], 0.0, 360.0)],
+                        vec![arc([2.0, 0.05], [0.5, 0.1], 0.0, 360.0)],
+                    ],
+                    Boundary::Closed,
+                ),
+            ),
+        ]
+    }
+
+    fn swept(region: &Region) -> Vec<BoundaryPiece> {
+        (region.boundary().iter())
+            .filter(|b| !b.piece.on_axis)
+            .cloned()
+            .collect()
+    }
+
+    /// Numbers from 0 to 1, always the same.
+    fn numbers(mut state: u64) -> impl FnMut() -> f64 {
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            #[allow(clippy::cast_precision_loss, reason = "53 bits")]
+            {
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            }
+        }
+    }
+
+    #[test]
+    fn tables_are_within_their_tolerance_of_the_distance() {
+        for (name, region) in regions() {
+            for voxels in [40.0, 300.0, 2000.0] {
+                let swept = swept(&region);
+                let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
+                let top = swept
+                    .iter()
+                    .fold(0.0_f64, |m, b| m.max(b.piece.bounds.max[1]));
+                let low = swept
+                    .iter()
+                    .fold(0.0_f64, |m, b| m.min(b.piece.bounds.min[1]));
+                let side = swept
+                    .iter()
+                    .fold(0.0_f64, |m, b| m.max(b.piece.bounds.max[0]))
+                    .max(top - low);
+                let cell = 1.3 * side / voxels;
+                let tolerance = 2.5e-5 * cell;
+                let chain = Chain::new(&swept, tolerance, 100_000, true).expect("few arcs");
+                let features = chain.len();
+                let began = std::time::Instant::now();
+                let extent = Extent {
+                    r: [0.0, 1.3 * side],
+                    z: [low - 0.1 * side, top + 0.1 * side],
+                    cell,
+                };
+                let field = MeridianField::new(chain, extent).expect("a field");
+                let built = began.elapsed();
+                let mut table = RadialTable::default();
+                let mut number = numbers(7);
+                let (mut worst, mut special, mut all) = (0.0_f64, 0_u32, 0_u32);
+                let (columns, _) = field.columns();
+                let mut time = std::time::Duration::ZERO;
+                for _ in 0..60 {
+                    let z = extent.z[0] + (extent.z[1] - extent.z[0]) * number();
+                    let began = std::time::Instant::now();
+                    table.fill(&field, z, 1.0, 3.5e-5 * cell);
+                    time += began.elapsed();
+                    for k in 0..columns {
+                        let t = number();
+                        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+                        let r = (k as f64 + t) * cell;
+                        let truth = exact.distance([r, z], f64::INFINITY);
+                        let [a, b, c, d, lost] =
+                            std::array::from_fn(|i| f64::from(table.coefficients[i][k]));
+                        all += 1;
+                        let found = if a.is_nan() {
+                            special += 1;
+                            table.mended(&field, k, r)
+                        } else {
+                            let v: f64 = a + (lost + t * (b + t * (c + t * d)));
+                            let inside =
+                                region.section().side_of(r, z) != crate::math::Side::Outside;
+                            assert!(
+                                truth < 1e-4 * cell || inside == (v < 0.0),
+                                "{name} {voxels}: sign at {r} {z}: {v}"
+                            );
+                            v.abs()
+                        };
+                        let error = (found - truth).abs();
+                        worst = worst.max(error / cell);
+                        assert!(
+                            error < 6.2e-5 * cell,
+                            "{name} {voxels}: {found} for {truth} at {r} {z}, cell {cell}, {}",
+                            a.is_nan()
+                        );
+                    }
+                }
+                let (leaves, smooth) = field.census();
+                eprintln!(
+                    "{name:>9} {voxels:>5}: {features} features, {leaves} leaves, {smooth} smooth, {built:?}; tables {:?} each, {:.2}% mended, worst {worst:.1e} of a cell",
+                    time / 60,
+                    100.0 * f64::from(special) / f64::from(all)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_jump_of_the_second_derivative_costs_no_more_than_assumed() {
+        // d = (x - s)²/2 beyond s: the error of the cubic through its ends.
+        let mut worst = [0.0_f64; 2];
+        for s in (1..200).map(|i| f64::from(i) / 200.0) {
+            for (power, factor) in [(2, 0.5), (3, 1.0 / 6.0)] {
+                let d = |x: f64| factor * (x - s).max(0.0).powi(power);
+                let slope = f64::from(power) * factor * (1.0 - s).powi(power - 1);
+                let (c, e) = (3.0 * d(1.0) - slope, slope - 2.0 * d(1.0));
+                for x in (0..=200).map(|i| f64::from(i) / 200.0) {
+                    let error = (c * x * x + e * x * x * x - d(x)).abs();
+                    let k = usize::from(power == 3);
+                    worst[k] = worst[k].max(error);
+                }
+            }
+        }
+        eprintln!("jumps: {worst:?}");
+        assert!(worst[0] < 1.0 / 60.0 && worst[1] <= 1.0 / 192.0 + 1e-12);
+    }
+}

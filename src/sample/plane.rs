@@ -1,0 +1,145 @@
+//! The distances of a layer's voxels from an upright axis: the same in every layer.
+//!
+//! Radii are kept as fixed-point numbers of cells, 16 bits before the point and 16 after: the cell, and the place in
+//! it. A grid whose voxels lie alike on both sides of the axis needs only half of them, or a quarter.
+
+use crate::grid::GridSpec;
+use crate::math::{Dd, Real};
+use rayon::prelude::*;
+
+/// Voxels for which one cell number is kept: lanes of that many read cells from it on.
+pub(super) const BLOCK: usize = 8;
+/// Marks a block whose cells are too far apart for lanes to reach.
+pub(super) const SCATTERED: u32 = u32::MAX;
+/// Cells that lanes reach from a block's first.
+pub(super) const REACH: u32 = 16;
+/// Places of a cell.
+pub(super) const PLACES: f64 = 65_536.0;
+
+/// Radii of the voxels of a layer.
+#[derive(Debug)]
+pub(super) struct Plane {
+    /// A row of [`stored`](Self::stored) radii for each of `rows`.
+    radii: Vec<u32>,
+    /// The least cell of each block of a row.
+    blocks: Vec<u32>,
+    /// Rows, each with the one that mirrors it.
+    rows: Vec<(usize, Option<usize>)>,
+    /// Radii of a row that are kept.
+    stored: usize,
+    /// Voxels of a row.
+    columns: usize,
+}
+
+/// One row of radii.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlaneRow<'a> {
+    pub(super) radii: &'a [u32],
+    pub(super) blocks: &'a [u32],
+}
+
+/// Asymmetry that still counts as none, in cells.
+const ALIKE: f64 = 1e-7;
+
+impl Plane {
+    /// The plane of `grid` around the axis through `axis`, in cells of `cell` scene units; `None` where a radius has
+    /// too many cells.
+    pub(super) fn new(grid: &GridSpec, axis: [Dd; 2], cell: f64) -> Option<Self> {
+        let [nx, ny, _] = grid.dims();
+        let away = |c: usize, n: usize| -> Vec<f64> {
+            let from = |i| (Dd::of(grid.centre_along(c, i)) - axis[c]).f64() / cell;
+            (0..n).map(from).collect()
+        };
+        let (x, y) = (away(0, nx), away(1, ny));
+        let widest = |v: &[f64]| v.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
+        // 16 bits of cells, and room for lanes to read on.
+        if !(widest(&x).hypot(widest(&y)) < 65_000.0) {
+            return None;
+        }
+        let alike = |v: &[f64]| (v.iter().zip(v.iter().rev())).all(|(a, b)| (a + b).abs() <= ALIKE);
+        let stored = if alike(&x) { nx.div_ceil(2) } else { nx };
+        let rows: Vec<(usize, Option<usize>)> = if alike(&y) {
+            let twin = |j: usize| (2 * j + 1 < ny).then(|| ny - 1 - j);
+            (0..ny.div_ceil(2)).map(|j| (j, twin(j))).collect()
+        } else {
+            (0..ny).map(|j| (j, None)).collect()
+        };
+        let width = stored.div_ceil(BLOCK);
+        let mut radii = vec![0; rows.len() * stored];
+        let mut blocks = vec![0; rows.len() * width];
+        let lines = radii
+            .par_chunks_mut(stored)
+            .zip(blocks.par_chunks_mut(width));
+        lines.zip(&rows).for_each(|((radii, blocks), &(j, _))| {
+            for (radius, x) in radii.iter_mut().zip(&x) {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "checked against the largest radius"
+                )]
+                {
+                    *radius = ((x * x + y[j] * y[j]).sqrt() * PLACES + 0.5) as u32;
+                }
+            }
+            for (block, radii) in blocks.iter_mut().zip(radii.chunks(BLOCK)) {
+                let cells = || radii.iter().map(|r| r >> 16);
+                let least = cells().min().unwrap_or(0);
+                let most = cells().max().unwrap_or(0);
+                *block = if most - least < REACH {
+                    least
+                } else {
+                    SCATTERED
+                };
+            }
+        });
+        Some(Self {
+            radii,
+            blocks,
+            rows,
+            stored,
+            columns: nx,
+        })
+    }
+
+    /// The rows to be computed: number, the one that mirrors it, and the radii of the stored part.
+    pub(super) fn rows(&self) -> impl Iterator<Item = (usize, Option<usize>, PlaneRow<'_>)> {
+        let width = self.stored.div_ceil(BLOCK);
+        (self.rows.iter().enumerate()).map(move |(n, &(j, twin))| {
+            let row = PlaneRow {
+                radii: &self.radii[n * self.stored..(n + 1) * self.stored],
+                blocks: &self.blocks[n * width..(n + 1) * width],
+            };
+            (j, twin, row)
+        })
+    }
+
+    /// The largest radius, in cells.
+    pub(super) fn reach(&self) -> u32 {
+        self.radii.iter().max().map_or(0, |r| (r >> 16) + 1)
+    }
+
+    /// Completes a row whose stored part is filled.
+    pub(super) fn mirror<T: Copy>(&self, row: &mut [T]) {
+        // In parts of fixed length, which the compiler reverses in registers.
+        let (left, right) = row.split_at_mut(self.stored);
+        let (left, from) = left[..right.len()].as_chunks::<16>();
+        let (to, right) = right.as_rchunks_mut::<16>();
+        for (b, a) in right.iter_mut().rev().zip(left) {
+            *b = std::array::from_fn(|n| a[15 - n]);
+        }
+        for (b, a) in to.iter_mut().rev().zip(from) {
+            *b = *a;
+        }
+    }
+
+    /// The voxel that mirrors voxel `i` of a row's stored part.
+    pub(super) fn mirrored(&self, i: usize) -> Option<usize> {
+        let twin = self.columns - 1 - i;
+        (self.stored < self.columns && twin != i).then_some(twin)
+    }
+
+    /// Radii kept of a row.
+    pub(super) fn stored(&self) -> usize {
+        self.stored
+    }
+}

@@ -1,0 +1,250 @@
+//! The quick ways to fill a grid against the exact answers at every voxel: membership bit for bit, stored distances
+//! within max(2 ulp, 1e-4 of the least spacing), and the same bytes whatever the instructions, the buffers or the way
+//! there.
+
+use glam::DVec3;
+use voxlathe::Scene;
+use voxlathe::grid::GridSpec;
+use voxlathe::math::{Kernel, SimdLevel};
+use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
+
+/// Solids whose axis is parallel to z, each with something that tables find hard.
+const SCENES: &[(&str, &str)] = &[
+    // Ridges inside and outside, the hole in the middle.
+    ("torus", "[[solid]]\nkind = 'torus'\nmajor = 1\nminor = 0.35\n"),
+    // Flat caps, edges, the ridge cone of an inside corner.
+    ("cylinder", "[[solid]]\nkind = 'cylinder'\nradius = 1\nheight = 0.7\n"),
+    // A tip on the axis, downwards.
+    ("cone", "[[solid]]\nkind = 'cone'\nradius1 = 1\nradius2 = 0\nheight = 2\naxis = { direction = [0, 0, -1] }\n"),
+    // One centre of curvature for the whole surface.
+    ("sphere", "[[solid]]\nkind = 'sphere'\nradius = 1\naxis = { origin = [0.3, -0.2, 0.1] }\n"),
+    // Rational curves of unequal weights with an inflection, a hollow, a thin wall.
+    (
+        "jar",
+        "[profiles.jar]
+boundary = 'closed'
+[[profiles.jar.curves]]
+kind = 'polyline'
+points = [[0, 0], [0.8, 0]]
+[[profiles.jar.curves]]
+kind = 'nurbs'
+degree = 3
+points = [[0.8, 0], [1.6, 0.3], [0.2, 1.0], [0.9, 1.8]]
+weights = [1, 3, 0.5, 1]
+[[profiles.jar.curves]]
+kind = 'polyline'
+points = [[0.9, 1.8], [0.86, 1.8]]
+[[profiles.jar.curves]]
+kind = 'nurbs'
+degree = 3
+points = [[0.86, 1.8], [0.1, 1.0], [1.3, 0.1], [0, 0.1]]
+[[profiles.jar.curves]]
+kind = 'polyline'
+points = [[0, 0.1], [0, 0]]
+[[solid]]
+kind = 'revolve'
+profile = 'jar'
+",
+    ),
+    // Convex and reflex corners, walls that touch at a point.
+    (
+        "star",
+        "[profiles.star]
+curves = [{ kind = 'polyline', points = [[2.5, 0], [1.86, 0.26], [1.81, 0.95], [1.36, 0.43], [0.69, 0.59], [1.05, 0], [0.69, -0.59], [1.36, -0.43], [1.81, -0.95], [1.86, -0.26], [2.5, 0]] }]
+[[solid]]
+kind = 'revolve'
+profile = 'star'
+",
+    ),
+    // Solids of one axis that are combined in the half-plane.
+    (
+        "hub",
+        "[[solid]]
+kind = 'cylinder'
+radius = 1
+height = 1
+[[solid]]
+kind = 'torus'
+major = 1
+minor = 0.2
+axis = { origin = [0, 0, 0.5] }
+operation = 'subtract'
+[[solid]]
+kind = 'sphere'
+radius = 0.3
+axis = { origin = [0, 0, 1] }
+",
+    ),
+];
+
+fn scene(text: &str) -> Scene {
+    Scene::parse(&format!("schema = 1\n{text}")).expect("a scene")
+}
+
+/// Grids of primes around a solid, centred on the axis and not, fine and coarse, flat voxels and tall.
+fn grids(scene: &Scene) -> Vec<GridSpec> {
+    let b = scene.bounds();
+    let (centre, side) = (0.5 * (b.min + b.max), b.longest_side());
+    let around = |dims: [usize; 3], at: DVec3, extent: DVec3| {
+        let spacing = extent / DVec3::from_array(dims.map(|d| d as f64));
+        GridSpec::new(dims, at - 0.5 * extent, spacing).expect("a grid")
+    };
+    let off = DVec3::new(0.13, -0.07, 0.03) * side;
+    vec![
+        around([67, 67, 43], centre, DVec3::splat(1.2 * side)),
+        around([64, 62, 31], centre, DVec3::new(1.2, 1.17, 1.2) * side),
+        around([61, 53, 29], centre + off, DVec3::new(1.4, 1.0, 1.3) * side),
+        around([5, 7, 3], centre, DVec3::splat(1.2 * side)),
+        around(
+            [31, 11, 17],
+            centre + 3.0 * off,
+            DVec3::new(2.0, 0.4, 2.0) * side,
+        ),
+        // Fine voxels across one part of the surface.
+        around(
+            [59, 47, 13],
+            centre + DVec3::new(0.4, 0.0, 0.1) * side,
+            DVec3::splat(1e-3 * side),
+        ),
+    ]
+}
+
+fn selection(band: Option<f64>) -> Selection {
+    Selection {
+        sdf: true,
+        band,
+        ..Selection::default()
+    }
+}
+
+/// The worst error of the stored distances as a share of what is allowed, every voxel compared.
+fn compare(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
+    let sampler = LayerSampler::new(scene.assembly(), grid, selection(None));
+    let n = usize::try_from(grid.voxel_count()).expect("small");
+    let (mut occupancy, mut sdf) = (vec![7; n], vec![f32::NAN; n]);
+    sampler.fill_occupancy(&mut occupancy);
+    sampler.fill_signed_distance(&mut sdf);
+    let [nx, ny, nz] = grid.dims();
+    let spacing = grid.spacing().min_element();
+    let mut worst = 0.0_f64;
+    let mut at = 0;
+    for k in 0..nz {
+        for j in 0..ny {
+            for i in 0..nx {
+                let p = grid.centre(i, j, k);
+                let (inside, exact) = (
+                    scene.assembly().contains(p),
+                    scene.assembly().signed_distance(p),
+                );
+                assert_eq!(occupancy[at] != 0, inside, "{name}: voxel ({i}, {j}, {k})");
+                let found = f64::from(sdf[at]);
+                assert_eq!(
+                    found <= 0.0,
+                    inside,
+                    "{name}: sign {found} at voxel ({i}, {j}, {k})"
+                );
+                let ulp = f64::from(f32::EPSILON) * exact.abs();
+                let share = (found - exact).abs() / (2.0 * ulp).max(1e-4 * spacing);
+                assert!(
+                    share <= 1.0,
+                    "{name}: {found} for {exact} at voxel ({i}, {j}, {k}), spacing {spacing}"
+                );
+                worst = worst.max(share);
+                at += 1;
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn every_voxel_is_within_the_bound() {
+    for (name, text) in SCENES {
+        let scene = scene(text);
+        let worst = grids(&scene)
+            .iter()
+            .map(|g| compare(name, &scene, g))
+            .fold(0.0, f64::max);
+        eprintln!("{name}: worst error {worst:.3} of the bound");
+    }
+}
+
+#[test]
+fn scales_and_places_do_not_matter() {
+    for (name, text) in SCENES {
+        for (scale, place) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
+            let moved = format!(
+                "{text}\nplace = [{{ scale = {scale} }}, {{ translate = [{place}, {place}, {place}] }}]\n"
+            );
+            // Only the last solid of a list is moved by that: the others' scenes stay one solid.
+            if text.matches("[[solid]]").count() > 1 {
+                continue;
+            }
+            let scene = scene(&moved);
+            for grid in grids(&scene).into_iter().take(3) {
+                compare(&format!("{name} x {scale} + {place}"), &scene, &grid);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_way_gives_the_same_bytes() {
+    let levels = [
+        SimdLevel::Scalar,
+        SimdLevel::Avx2,
+        SimdLevel::Avx512,
+        SimdLevel::Auto,
+    ];
+    for (name, text) in SCENES {
+        let scene = scene(text);
+        for grid in grids(&scene) {
+            let n = usize::try_from(grid.voxel_count()).expect("small");
+            for band in [None, Some(2.5 * grid.spacing().max_element())] {
+                let mut first: Option<(Vec<u8>, Vec<u32>)> = None;
+                for kernel in levels.iter().filter_map(|l| Kernel::new(*l).ok()) {
+                    let sampler = LayerSampler::new(scene.assembly(), &grid, selection(band))
+                        .with_kernel(kernel);
+                    let (mut occupancy, mut sdf) = (vec![7; n], vec![f32::NAN; n]);
+                    sampler.fill_occupancy(&mut occupancy);
+                    sampler.fill_signed_distance(&mut sdf);
+                    let bits = |v: &[f32]| v.iter().map(|d| d.to_bits()).collect::<Vec<_>>();
+                    let mut buffers = LayerBuffers::default();
+                    for (k, layer) in sdf.chunks(grid.layer_len()).enumerate() {
+                        sampler.sample(k, &mut buffers);
+                        let voxels = k * grid.layer_len()..(k + 1) * grid.layer_len();
+                        assert_eq!(bits(&buffers.sdf), bits(layer), "{name}: layer {k}");
+                        assert_eq!(buffers.occupancy, occupancy[voxels], "{name}: layer {k}");
+                        let inside: u64 = buffers.occupancy.iter().map(|o| u64::from(*o)).sum();
+                        assert_eq!(buffers.inside, inside);
+                    }
+                    let found = (occupancy, bits(&sdf));
+                    let wanted = first.get_or_insert_with(|| found.clone());
+                    assert!(*wanted == found, "{name}: {:?} differs", kernel.level());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_band_clamps_and_changes_nothing_else() {
+    for (name, text) in SCENES {
+        let scene = scene(text);
+        let grid = grids(&scene)[0];
+        let band = 3.0 * grid.spacing().max_element();
+        let n = usize::try_from(grid.voxel_count()).expect("small");
+        let fill = |band| {
+            let mut sdf = vec![f32::NAN; n];
+            LayerSampler::new(scene.assembly(), &grid, selection(band))
+                .fill_signed_distance(&mut sdf);
+            sdf
+        };
+        let (full, narrow) = (fill(None), fill(Some(band)));
+        #[allow(clippy::cast_possible_truncation, reason = "as stored")]
+        let band = band as f32;
+        for (a, b) in full.iter().zip(&narrow) {
+            assert_eq!(a.clamp(-band, band).to_bits(), b.to_bits(), "{name}");
+        }
+    }
+}
