@@ -115,6 +115,13 @@ fn solids() -> Vec<(String, Vec<NurbsVolume>)> {
     all.push(("section, cubic half".to_owned(), vec![cubic]));
     let bowl = read_volumes("scenes/volumes/tea_bowl.g2").expect("a file");
     all.push(("tea bowl".to_owned(), bowl));
+    // One through the other: the faces of each bound the solid, also inside.
+    let through = [(2.0, 3.0), (1.0, 5.0)].map(|(radius, height)| {
+        let form = Construction::CurveDisc(DiscForm::Polar);
+        cylinder_volume(radius, height, form, AngleInterval::FULL, &AxisFrame::WORLD)
+            .expect("a volume")
+    });
+    all.push(("one through the other".to_owned(), through.to_vec()));
     // Two halves and a part of a tube that share faces; the ruled one in other directions and refined.
     let curve = meridian(&wall()).expect("a curve");
     let half = |start| {
@@ -174,9 +181,9 @@ fn points(volumes: &[NurbsVolume], count: u32) -> Vec<DVec3> {
             all.push(x + offsets[n as usize % 9] * DVec3::new(1.0, -1.0, 0.5));
         }
     }
-    for n in 0..7 * 7 * 7 {
-        let place = |d: i32| f64::from(n / d % 7 - 3);
-        all.push(DVec3::new(place(1), place(7), place(49)));
+    for n in 0..5 * 5 * 5 {
+        let place = |d: i32| f64::from(n / d % 5 - 2);
+        all.push(DVec3::new(place(1), place(5), place(25)));
     }
     all
 }
@@ -254,7 +261,7 @@ fn one_parameter_at_a_time_is_the_search_in_space() {
     for (name, volumes) in solids() {
         let cells = Cells::new(&volumes).expect("cells");
         assert_eq!(cells.turned(), volumes.len(), "{name}");
-        let (off, asked, other) = compare(&name, &volumes, 200);
+        let (off, asked, other) = compare(&name, &volumes, 40);
         eprintln!(
             "{name}: {asked} points, off by {off:.1} ε (size + |P|), {other} in other last bits"
         );
@@ -319,7 +326,7 @@ fn it_is_faster_than_the_search_in_space() {
     let (mut before, mut after) = (0.0, 0.0);
     for (name, volumes) in solids() {
         let cells = Cells::new(&volumes).expect("cells");
-        let inside: Vec<DVec3> = (0..4000)
+        let inside: Vec<DVec3> = (0..1000)
             .filter_map(|n| {
                 let volume = &volumes[n as usize % volumes.len()];
                 let at = std::array::from_fn(|k| {
@@ -349,23 +356,24 @@ fn distances_are_those_to_the_faces_of_the_nets() {
         let solid = Assembly::new(vec![Part::new(name.clone(), 1, Body::Patches(body))]);
         let unit = f64::EPSILON * length(&volumes);
         let mut worst = 0.0_f64;
-        for p in points(&volumes, 25) {
+        for p in points(&volumes, 10) {
             let (by_net, found) = (
                 faces.distance(p, f64::INFINITY),
                 solid.signed_distance(p).abs(),
             );
             let off = (by_net - found) / unit;
             worst = worst.max(off.abs());
-            // The search over the faces is content with 64 ε of the unit, which is up to twice the size; where the rim of a
-            // biquadratic disc has its corners, and the map both its tangents along the rim, with less.
+            // The search over the faces is content with 64 ε of the unit, which is up to twice the size. On the surface,
+            // where the map is singular (a pole, a corner of the biquadratic disc), it ends up to 1e-9 of the size too far.
+            let near = by_net <= 1e-8 * length(&volumes) && off > 0.0;
             assert!(
-                (-256.0..=1e5).contains(&off) && (off <= 256.0 || name.contains("disc")),
+                off.abs() <= 256.0 || near,
                 "{name}: {p:?} {by_net:e} {found:e} off by {off} ε"
             );
         }
         let ask = |f: &dyn Fn(DVec3) -> f64| {
             let start = Instant::now();
-            let some = points(&volumes, 25);
+            let some = points(&volumes, 10);
             let sum: f64 = some.iter().map(|&p| f(p)).sum();
             (start.elapsed().as_secs_f64() * 1e9 / some.len() as f64, sum)
         };
