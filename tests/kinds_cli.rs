@@ -858,6 +858,7 @@ fn folded_maps_name_their_patch_and_place() {
             "patches[0]",
             "folds",
             "positive at [0.0, 0.0, 0.0]",
+            "in Bézier cell 0 (spans [0, 0, 0])",
             "negative at [1.0, 1.0,",
         ],
     );

@@ -107,7 +107,7 @@ pub use curve::NurbsCurve;
 pub use error::NurbsError;
 pub use homogeneous::{Homogeneous, rational_derivatives};
 pub use knot_vector::{KnotSpan, KnotVector, MAX_DEGREE, MAX_KNOT_MAGNITUDE, MIN_SPAN_WIDTH};
-pub use orientation::{JacobianSign, Orientation, OrientationError};
+pub use orientation::{CellIndex, JacobianSign, Orientation, OrientationError};
 pub use refine::{clamp, elevate_degree, insert_knot, refine_knots};
 pub use tensor::{NurbsSurface, NurbsTensor, NurbsVolume};
 pub use tensor_bezier::CellPiece;

@@ -79,19 +79,50 @@ pub enum JacobianSign {
     },
 }
 
+/// A Bézier cell of a volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct CellIndex {
+    /// Its place in the order of [`to_bezier`](NurbsVolume::to_bezier), from 0: the first direction fastest.
+    pub number: usize,
+    /// The number of its span in each direction, from 0; spans without length are not counted.
+    pub spans: [usize; 3],
+}
+
+impl CellIndex {
+    /// The cell of that number, of so many in each direction.
+    fn new(number: usize, cells: [usize; 3]) -> Self {
+        let [a, b, _] = cells;
+        Self {
+            number,
+            spans: [number % a, number / a % b, number / (a * b)],
+        }
+    }
+}
+
+impl std::fmt::Display for CellIndex {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { number, spans } = self;
+        write!(f, "cell {number} (spans {spans:?})")
+    }
+}
+
 /// Why a volume has no orientation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrientationError {
     /// The Jacobian determinant takes both signs.
     #[error(
-        "the volume folds over itself: its Jacobian determinant is positive at {positive:?} and negative at {negative:?}"
+        "the volume folds over itself: its Jacobian determinant is positive at {positive:?} in Bézier {} and negative at {negative:?} in Bézier {}",
+        cells[0],
+        cells[1]
     )]
     Folded {
         /// Parameters where it is greater than zero.
         positive: [f64; 3],
         /// Parameters where it is less than zero.
         negative: [f64; 3],
+        /// The Bézier cells of the two places; one cell twice where it folds by itself.
+        cells: [CellIndex; 2],
     },
     /// A cell has no volume.
     #[error("the volume is flat, but for rounding, between parameters {start:?} and {end:?}")]
@@ -180,12 +211,18 @@ impl NurbsVolume {
         let mut positive = None;
         let mut negative = None;
         let mut open = None;
-        for (sign, (start, end)) in self.jacobian_signs()? {
+        let cells = self.knots().each_ref().map(|k| k.spans().count());
+        for (number, (sign, (start, end))) in self.jacobian_signs()?.into_iter().enumerate() {
+            let cell = CellIndex::new(number, cells);
             match sign {
-                JacobianSign::Positive { at } => positive = positive.or(Some(at)),
-                JacobianSign::Negative { at } => negative = negative.or(Some(at)),
+                JacobianSign::Positive { at } => positive = positive.or(Some((at, cell))),
+                JacobianSign::Negative { at } => negative = negative.or(Some((at, cell))),
                 JacobianSign::Folded { positive, negative } => {
-                    return Err(OrientationError::Folded { positive, negative });
+                    return Err(OrientationError::Folded {
+                        positive,
+                        negative,
+                        cells: [cell; 2],
+                    });
                 }
                 JacobianSign::Flat => open = open.or(Some(OrientationError::Flat { start, end })),
                 JacobianSign::Undecided { start, end } => {
@@ -194,9 +231,11 @@ impl NurbsVolume {
             }
         }
         match (positive, negative, open) {
-            (Some(positive), Some(negative), _) => {
-                Err(OrientationError::Folded { positive, negative })
-            }
+            (Some((positive, a)), Some((negative, b)), _) => Err(OrientationError::Folded {
+                positive,
+                negative,
+                cells: [a, b],
+            }),
             (_, _, Some(open)) => Err(open),
             (_, Some(_), None) => Ok(Orientation::Negative),
             _ => Ok(Orientation::Positive),
@@ -412,10 +451,15 @@ mod tests {
             match block.orientation() {
                 Ok(Orientation::Positive) => prop_assert!(least >= -1e-12, "{least}"),
                 Ok(Orientation::Negative) => prop_assert!(greatest <= 1e-12, "{greatest}"),
-                Err(OrientationError::Folded { positive, negative }) => {
+                Err(OrientationError::Folded { positive, negative, cells }) => {
                     // Samples may miss a fold; its witnesses do not.
                     let sign = |at| block.jacobian(at).expect("inside").determinant;
                     prop_assert!(sign(positive) > 0.0 && sign(negative) < 0.0);
+                    let pieces = block.to_bezier().expect("finite");
+                    for (at, cell) in [positive, negative].into_iter().zip(cells) {
+                        let piece = &pieces[cell.number];
+                        prop_assert!((0..3).all(|k| (piece.start[k]..=piece.end[k]).contains(&at[k])));
+                    }
                 }
                 Err(other) => prop_assert!(false, "{other}"),
             }
@@ -462,7 +506,10 @@ mod tests {
             ([1.0, 2.0], 1.0),
         ];
         let folded = turned(&knots, &back, &biquadratic());
-        let Err(OrientationError::Folded { positive, negative }) = folded.orientation() else {
+        let Err(OrientationError::Folded {
+            positive, negative, ..
+        }) = folded.orientation()
+        else {
             panic!("{:?}", folded.orientation());
         };
         assert!(folded.jacobian(positive).expect("inside").determinant > 0.0);
@@ -485,10 +532,44 @@ mod tests {
             signs[..],
             [JacobianSign::Positive { .. }, JacobianSign::Negative { .. }]
         ));
-        assert!(matches!(
-            pleat.orientation(),
-            Err(OrientationError::Folded { .. })
-        ));
+        let Err(error @ OrientationError::Folded { cells, .. }) = pleat.orientation() else {
+            panic!("{:?}", pleat.orientation());
+        };
+        let cell = |number, spans| CellIndex { number, spans };
+        assert_eq!(cells, [cell(0, [0, 0, 0]), cell(1, [0, 0, 1])]);
+        let text = error.to_string();
+        assert!(
+            text.contains("in Bézier cell 0 (spans [0, 0, 0]) and"),
+            "{text}"
+        );
+        assert!(
+            text.ends_with("in Bézier cell 1 (spans [0, 0, 1])"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_fold_names_its_cell() {
+        // 2 x 3 x 2 cells; a knot twice makes a span without length, which does not count.
+        let knots = [
+            KnotVector::clamped_uniform(1, 3).expect("valid"),
+            KnotVector::clamped_uniform(1, 4).expect("valid"),
+            KnotVector::new(1, vec![0.0, 0.0, 0.5, 0.5, 1.0, 1.0]).expect("valid"),
+        ];
+        let mut points: Vec<[f64; 3]> = indices([3, 4, 4])
+            .map(|[i, j, k]| [i as f64, j as f64, [0.0, 1.0, 1.0, 2.0][k]])
+            .collect();
+        // The corner of the last cell but those above it goes through to the other side.
+        points[2 + 3 * 3] = [0.0, 1.0, 2.5];
+        let block = NurbsVolume::new(knots, points, vec![1.0; 48]).expect("valid");
+        let Err(OrientationError::Folded { cells, .. }) = block.orientation() else {
+            panic!("{:?}", block.orientation());
+        };
+        let wanted = CellIndex {
+            number: 5,
+            spans: [1, 2, 0],
+        };
+        assert_eq!(cells, [wanted; 2]);
     }
 
     #[test]

@@ -17,9 +17,10 @@
 use super::leaf::{self, Leaf, Tree};
 use super::net::Counts;
 use super::shared::{self, Face};
+use super::turned::TurnedSet;
 use crate::math::tolerance::{U, gamma};
 use crate::math::{Dd, Real};
-use crate::nurbs::{KnotVector, NurbsError, NurbsVolume};
+use crate::nurbs::{KnotVector, NurbsCurve, NurbsError, NurbsVolume};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -76,6 +77,9 @@ pub struct Cells {
     pub(super) cells: Vec<Cell>,
     pub(super) leaves: Vec<Leaf>,
     pub(super) tree: Tree,
+    pub(super) turned: TurnedSet,
+    /// Whether all volumes are turned and ruled to their axes.
+    pub(super) ruled: bool,
 }
 
 impl Cells {
@@ -99,7 +103,10 @@ impl Cells {
             .flat_map_iter(|(index, cell)| leaf::presplit(index, cell, cells.len()))
             .collect();
         let tree = Tree::new(&mut leaves);
+        let turned = TurnedSet::new(volumes);
         Ok(Self {
+            ruled: turned.is_ruled(),
+            turned,
             centre: frame.centre,
             inverse_unit: frame.inverse_unit,
             cells,
@@ -124,6 +131,20 @@ impl Cells {
     #[must_use]
     pub fn leaves(&self) -> usize {
         self.leaves.len()
+    }
+
+    /// The number of volumes whose net is proved to be a product: a section turned about an axis, or a disc of any shape
+    /// scaled and shifted along a line. [`Self::invert`] has their parameters one or two at a time, an angle in closed
+    /// form.
+    #[must_use]
+    pub fn turned(&self) -> usize {
+        self.turned.recognised()
+    }
+
+    /// Closed loops (r, z), one a volume, whose union is turned about the z axis, and the turn in degrees, from where and how
+    /// far: to the rounding of the nets that is the solid. `None` where it is none, or about another axis.
+    pub(crate) fn outlines(&self) -> Option<(Vec<Vec<NurbsCurve<2>>>, [f64; 2])> {
+        self.turned.outlines()
     }
 
     /// A point of the net's coordinates in those of the cells, with a bound on its rounding.

@@ -4,7 +4,7 @@ use super::bounds;
 use super::distance;
 use super::face::{Frame, OuterFace, collect};
 use super::face_net::length;
-use super::face_tree::PatchTree;
+use super::face_tree::{Box3, PatchTree};
 use super::line;
 use crate::math::Aabb;
 use crate::nurbs::{NurbsError, NurbsVolume};
@@ -164,6 +164,18 @@ impl FaceSet {
         let n = direction / most;
         let local = bounds::support(&self.tree, n.to_array());
         (local * self.frame.unit + n.dot(self.frame.centre)) * most
+    }
+
+    /// Whether a box may hold a point of the outer faces: `false` is certain.
+    pub(crate) fn may_touch(&self, min: DVec3, max: DVec3) -> bool {
+        // Control points are off by some ten ε of the unit.
+        let slack = 64.0 * f64::EPSILON;
+        let low = self.frame.local(min).map(|x| x - slack);
+        let high = self.frame.local(max).map(|x| x + slack);
+        let meets = |b: &Box3| (0..3).all(|c| !(b.min[c] > high[c] || b.max[c] < low[c]));
+        let found = std::cell::Cell::new(false);
+        (self.tree).visit(|b| !found.get() && meets(b), |_| found.set(true));
+        found.get()
     }
 
     /// Calls `each(a, b)` with closed intervals that together hold every s in `range` at which

@@ -22,6 +22,7 @@
 //!   touching. The unit is at most twice the size.
 //! * Cost: step 2 allocates nothing.
 
+use super::arc::Found;
 use super::cells::{Cell, Cells};
 use super::leaf::{self, Certificate, Hull, Leaf, Window};
 use super::net::{self, Row};
@@ -52,7 +53,7 @@ pub struct Preimage {
 
 /// What is known of a point so far.
 #[derive(Debug, Clone, Copy, Default)]
-struct Found {
+struct Known {
     inside: bool,
     outer: bool,
     shared: bool,
@@ -60,7 +61,7 @@ struct Found {
     first: Option<(usize, [f64; 3])>,
 }
 
-impl Found {
+impl Known {
     fn side(&self) -> Side {
         match (self.inside, self.outer, self.shared) {
             (true, ..) | (false, false, true) => Side::Inside,
@@ -109,7 +110,7 @@ struct Query<'a, E: FnOnce() -> [Dd; 3]> {
     error: f64,
     exact: Option<E>,
     known: [Dd; 3],
-    found: Found,
+    found: Known,
     /// Whether one cell that has the point inside is enough.
     one: bool,
 }
@@ -158,13 +159,33 @@ impl Cells {
     ///
     /// The answer is that of the exact point. A point that is not finite is outside.
     pub fn side(&self, point: DVec3, error: DVec3, exact: impl FnOnce() -> [Dd; 3]) -> Side {
+        if self.ruled {
+            match self.turned.find(point, error.abs().max_element()) {
+                Found::At(_) => return Side::Inside,
+                Found::Nowhere => return Side::Outside,
+                Found::Unclear => {}
+            }
+        }
         self.ask(point, error, exact, true).side()
     }
 
     /// Where the point comes from: of several places the one in the first volume, in the first of its
     /// cells, with the least parameters. `None` outside the solid.
+    ///
+    /// Volumes [turned about an axis](Self::turned) are answered one parameter at a time; the place is mapped to
+    /// within 64 eps (size + |P|) of the point, as that of [`Self::invert_in_space`] is.
     #[must_use]
     pub fn invert(&self, point: DVec3) -> Option<Preimage> {
+        match self.turned.find(point, 0.0) {
+            Found::At(found) => Some(found),
+            Found::Nowhere => None,
+            Found::Unclear => self.invert_in_space(point),
+        }
+    }
+
+    /// [`Self::invert`] from the cells alone, in all three parameters together, whatever the nets are.
+    #[must_use]
+    pub fn invert_in_space(&self, point: DVec3) -> Option<Preimage> {
         let exact = || point.to_array().map(Dd::of);
         let (cell, t) = self.ask(point, DVec3::ZERO, exact, false).first?;
         let cell = self.cells.get(cell)?;
@@ -178,7 +199,7 @@ impl Cells {
     }
 
     /// Asks all leaves around the point, or until one has it inside when `one` will do.
-    fn ask(&self, point: DVec3, error: DVec3, exact: impl FnOnce() -> [Dd; 3], one: bool) -> Found {
+    fn ask(&self, point: DVec3, error: DVec3, exact: impl FnOnce() -> [Dd; 3], one: bool) -> Known {
         let (local, bound) = self.to_local(point, error);
         let mut query = Query {
             cells: self,
@@ -186,7 +207,7 @@ impl Cells {
             error: bound,
             exact: Some(exact),
             known: [Dd::ZERO; 3],
-            found: Found::default(),
+            found: Known::default(),
             one,
         };
         if local.iter().all(|x| x.is_finite()) && bound.is_finite() {
@@ -541,7 +562,7 @@ impl<E: FnOnce() -> [Dd; 3]> Query<'_, E> {
     }
 }
 
-impl Found {
+impl Known {
     /// A box of no size, or one that the bound on the work left over, meets the point.
     fn touch_small(&mut self, cell: &Cell, faces: [[bool; 2]; 3]) {
         let outer =

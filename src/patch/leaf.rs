@@ -480,11 +480,20 @@ struct Node {
 impl Tree {
     /// The tree over the leaves, which come out in its order.
     pub(super) fn new(leaves: &mut Vec<Leaf>) -> Self {
+        Self::over(leaves, |leaf| leaf.bounds)
+    }
+
+    /// The tree over things that have boxes; they come out in its order.
+    pub(super) fn over<T: Clone>(
+        leaves: &mut Vec<T>,
+        bounds: impl Fn(&T) -> [[f64; 3]; 2],
+    ) -> Self {
+        let boxes: Vec<_> = leaves.iter().map(bounds).collect();
         let mut order: Vec<usize> = (0..leaves.len()).collect();
         let mut nodes = Vec::with_capacity(2 * leaves.len());
         let mut sorted = Vec::with_capacity(leaves.len());
         if !order.is_empty() {
-            grow(leaves, &mut order, &mut nodes, &mut sorted);
+            grow(&boxes, &mut order, &mut nodes, &mut sorted);
         }
         *leaves = sorted.iter().map(|&i| leaves[i].clone()).collect();
         Self { nodes }
@@ -510,12 +519,17 @@ impl Tree {
     }
 }
 
-fn grow(leaves: &[Leaf], order: &mut [usize], nodes: &mut Vec<Node>, sorted: &mut Vec<usize>) {
+fn grow(
+    boxes: &[[[f64; 3]; 2]],
+    order: &mut [usize],
+    nodes: &mut Vec<Node>,
+    sorted: &mut Vec<usize>,
+) {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     let mut middles = bounds;
     for &i in order.iter() {
         for k in 0..3 {
-            let [low, high] = leaves[i].bounds.map(|b| b[k]);
+            let [low, high] = boxes[i].map(|b| b[k]);
             bounds[0][k] = bounds[0][k].min(low);
             bounds[1][k] = bounds[1][k].max(high);
             middles[0][k] = middles[0][k].min(low + high);
@@ -541,12 +555,12 @@ fn grow(leaves: &[Leaf], order: &mut [usize], nodes: &mut Vec<Node>, sorted: &mu
     });
     if order.len() > 1 {
         let axis = largest(std::array::from_fn(|k| middles[1][k] - middles[0][k]));
-        let key = |i: usize| leaves[i].bounds[0][axis] + leaves[i].bounds[1][axis];
+        let key = |i: usize| boxes[i][0][axis] + boxes[i][1][axis];
         let half = order.len() / 2;
         order.select_nth_unstable_by(half, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
         let (left, right) = order.split_at_mut(half);
-        grow(leaves, left, nodes, sorted);
-        grow(leaves, right, nodes, sorted);
+        grow(boxes, left, nodes, sorted);
+        grow(boxes, right, nodes, sorted);
     }
     nodes[place].skip = short(nodes.len());
 }

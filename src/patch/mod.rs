@@ -10,6 +10,8 @@
 //!   leaf       parts of cells on which the map is certified one to one, and a box tree over them
 //!   newton     the one root in such a part, with a bound
 //!   invert     membership and preimages
+//!   turned     volumes proved to be turned about an axis: preimages one parameter at a time, by
+//!              arc (angles), monotone (heights) and section (the half-plane, a disc)
 //!   net        nets of Bernstein coefficients
 //!   face*      the faces of cells that are not shared and not collapsed, with a tree over their parts
 //!   distance   the nearest point of them, certified
@@ -47,6 +49,7 @@
 //! the same net after refinement. Shared faces are no boundary, nor are those collapsed to a line or a point.
 //! Patches that overlap otherwise are each counted, and each one's faces bound it.
 
+mod arc;
 mod bounds;
 mod cells;
 mod distance;
@@ -60,9 +63,12 @@ mod face_tree;
 mod invert;
 mod leaf;
 mod line;
+mod monotone;
 mod net;
 mod newton;
+mod section;
 mod shared;
+mod turned;
 
 pub use cells::Cells;
 pub use face::{End, OuterFace, outer_faces};

@@ -252,11 +252,18 @@ impl Assembly {
     /// The volume that gives a point of the composite its scalars, and where in it the point comes
     /// from: the last added part that holds it, where that is one of trivariate NURBS.
     pub(crate) fn preimage(&self, point: DVec3) -> Option<(&Patches, Preimage)> {
-        let part = self.added().rev().find(|p| p.contains(point))?;
-        let Body::Patches(volume) = &**part.body() else {
-            return None;
-        };
-        Some((volume, volume.invert(point)?))
+        for part in self.added().rev() {
+            // The question where it comes from answers whether it is inside, but for points on the boundary.
+            if let Body::Patches(volume) = &**part.body()
+                && let Some(found) = volume.invert(point)
+            {
+                return Some((volume, found));
+            }
+            if part.contains(point) {
+                return None;
+            }
+        }
+        None
     }
 
     /// The part of the composite that has a material: what the parts of other materials cover later

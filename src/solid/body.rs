@@ -217,6 +217,14 @@ impl Body {
         self.revolved().is_some_and(|b| *b.turn() != Turn::Full)
     }
 
+    /// The body as a turned region where it is one, to some ulps: what a volume is whose nets are proved to be turned.
+    pub(super) fn as_turned(&self) -> Option<Self> {
+        match self {
+            Self::Patches(b) => b.turned().cloned().map(Self::Revolved),
+            _ => None,
+        }
+    }
+
     /// What a question costs, compared with one to a solid of lines and arcs.
     pub(super) fn price(&self) -> u64 {
         match self {
@@ -229,10 +237,11 @@ impl Body {
     /// Whether the surface may come within `margin` (scene units) of a stretch of a path.
     pub(super) fn may_meet(&self, stretch: &Stretch, margin: f64) -> bool {
         match self {
-            Self::Revolved(b) if !stretch.path.is_free() => b.may_meet(stretch, margin),
-            Self::Block(b) if !stretch.path.is_free() => b.may_meet(stretch, margin),
+            Self::Revolved(b) => b.may_meet(stretch, margin),
+            Self::Block(b) => b.may_meet(stretch, margin),
+            Self::Patches(b) => b.may_meet(stretch, margin),
             // The distance tells.
-            _ => true,
+            Self::Ellipsoid(_) => true,
         }
     }
 }

@@ -6,6 +6,8 @@
 //! profile, halved where the estimates are largest. Where a circle touches another body the
 //! integrand has a root or a step; halving closes in on it.
 //!
+//! Volumes whose nets are proved to be turned take part as the turned region that they are.
+//!
 //! * Error: the panels' estimates, the hair by which a surface's sides are told apart times the
 //!   length of the edges, and the rounding of the sums.
 
@@ -22,14 +24,14 @@ use std::sync::Arc;
 
 /// Estimated errors to reach, relative to area, volume, volume times size and its square.
 const TOLERANCE: f64 = 1e-12;
+/// How far the surface of a turned region may be from that of the volumes it stands for, in ε times the furthest
+/// coordinate: a control point may be 8 ε (size + |P|) from where it is taken for.
+const STAND_IN: f64 = 64.0;
 /// Panels to begin with, times the bodies that each may cross: more are not begun.
 const MOST_BEGUN: usize = 300_000;
 /// Stretches of circles looked at, those against free-form curves counted several times, after which
 /// the estimates are taken as they are: some seconds' work.
 const MOST_WORK: u64 = 6_000_000;
-/// Stretches after which a round of panels is given up: where surfaces nearly coincide each of its
-/// circles takes thousands.
-const MOST_OF_A_ROUND: u64 = 2 * MOST_WORK;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 /// Places of the quantities.
@@ -187,6 +189,7 @@ fn over_faces(
         return Some((Moments::EMPTY, None));
     };
     let centre = 0.5 * (around.min + around.max);
+    let stand_ins = bodies.iter().any(|b| b.as_turned().is_some());
     let (bodies, terms) = about(bodies, terms, centre);
     let size = around.longest_side();
     let reach = bodies.iter().fold(size, |m, b| {
@@ -194,12 +197,16 @@ fn over_faces(
         m.max(b.min.abs().max(b.max.abs()).max_element())
     });
     let faces = Faces::new(bodies, terms, reach);
-    let mut panels = integrated(&faces, size)?;
+    let most = if stand_ins { 5 * MOST_WORK } else { MOST_WORK };
+    let mut panels = integrated(&faces, size, most)?;
     panels.sort_by(|a, b| {
         let key = |p: &Panel| p.sheet.number();
         key(a).cmp(&key(b)).then(a.range[0].total_cmp(&b.range[0]))
     });
-    let moments = moments(&totals(&panels, &faces), centre);
+    let mut moments = moments(&totals(&panels, &faces), centre);
+    if stand_ins {
+        moments.widen(STAND_IN * f64::EPSILON, reach + centre.length());
+    }
     let bounds = if with_bounds && moments.area.value > 0.0 {
         extremes(&faces, &panels, centre, size)
     } else {
@@ -215,22 +222,27 @@ fn about(bodies: &[Arc<Body>], terms: &[Term], centre: DVec3) -> (Vec<Arc<Body>>
     let mut renumbered = terms.to_vec();
     for factor in renumbered.iter_mut().flat_map(|t| &mut t.factors) {
         factor.body = *places[factor.body].get_or_insert_with(|| {
-            moved.push(Arc::new(bodies[factor.body].translated(-centre)));
+            let body = &bodies[factor.body];
+            let turned = body.as_turned();
+            moved.push(Arc::new(
+                turned.as_ref().unwrap_or(body).translated(-centre),
+            ));
             moved.len() - 1
         });
     }
     (moved, renumbered)
 }
 
-/// Panels whose estimated errors sum to the tolerances, or the best there is; `None` where even the
-/// first are too many.
-fn integrated(faces: &Faces, size: f64) -> Option<Vec<Panel>> {
-    // `None` where the round is given up. Whether it is does not depend on the order of the work.
+/// Panels whose estimated errors sum to the tolerances, or the best that `most` stretches give; `None` where
+/// even the first are too many.
+fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Panel>> {
+    // A round of twice the work is given up: where surfaces nearly coincide each of its circles takes thousands of
+    // stretches. `None` then. Whether it is does not depend on the order of the work.
     let make = |work: Vec<(Sheet, [f64; 2])>| -> Option<Vec<Panel>> {
-        let most = faces.work() + MOST_OF_A_ROUND;
+        let round = faces.work() + 2 * most;
         let panels = work.into_par_iter();
         panels
-            .map(|(s, range)| (faces.work() <= most).then(|| Panel::new(faces, s, range)))
+            .map(|(s, range)| (faces.work() <= round).then(|| Panel::new(faces, s, range)))
             .collect()
     };
     let mut panels = make(faces.sheets(MOST_BEGUN)?)?;
@@ -261,7 +273,7 @@ fn integrated(faces: &Faces, size: f64) -> Option<Vec<Panel>> {
                 .all(|k| p.integrals[k].error <= p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0))
         };
         chosen.retain(|&i| divides(&panels[i]) && !noisy(&panels[i]));
-        if chosen.is_empty() || faces.work() > MOST_WORK {
+        if chosen.is_empty() || faces.work() > most {
             return Some(panels);
         }
         chosen.sort_unstable();

@@ -66,6 +66,11 @@ pub struct MeasureErrors {
     pub inertia: f64,
 }
 
+/// What rounding of joints may change: regions that are joined are cut where their curves cross, to some ulps.
+fn rounding(value: f64) -> f64 {
+    8.0 * f64::EPSILON * value.abs()
+}
+
 impl Moments {
     /// The moments of nothing.
     pub const EMPTY: Self = {
@@ -81,6 +86,22 @@ impl Moments {
             second: [[zero; 3]; 3],
         }
     };
+
+    /// Adds to the errors what a surface that is off by `share` of `reach` changes, where no point is farther than `reach`
+    /// from the point that the moments are about.
+    pub(super) fn widen(&mut self, share: f64, reach: f64) {
+        let off = share * reach;
+        let area = self.area.value.abs();
+        // Lengths change by that share, and where faces end by the distance.
+        self.area.error += 4.0 * share * area;
+        self.volume.error += off * area;
+        for i in 0..3 {
+            self.first[i].error += off * area * reach;
+            for j in 0..3 {
+                self.second[i][j].error += off * area * reach * reach;
+            }
+        }
+    }
 
     /// The same moments about another point.
     #[must_use]
@@ -151,8 +172,8 @@ impl Moments {
             inertia,
             bounds,
             error_estimate: MeasureErrors {
-                volume: self.volume.error,
-                area: self.area.error,
+                volume: self.volume.error + rounding(self.volume.value),
+                area: self.area.error + rounding(self.area.value),
                 centroid: centre.map_or(0.0, |(_, error)| error),
                 inertia: inertia_error,
             },

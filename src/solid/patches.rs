@@ -1,20 +1,25 @@
 //! A solid that is the image of trivariate NURBS, in its place.
 //!
 //! Membership is point inversion over the Bézier cells, distance that to the outer faces, rows ask
-//! where their line may meet those; see [`crate::patch`]. What is moved is the question, not the net.
+//! where their line may meet those; see [`crate::patch`]. Where the nets are proved to be turned about the z
+//! axis of their frame, distances are those of the turned region, which is the same solid to some ulps; volume, area and
+//! centroid of both are compared before it is trusted. What is moved is the question, not the net.
 //!
 //! * Units: local lengths are those of the nets; the frame scales and places them.
 //! * Volume and moments: integrals of the Jacobian determinant, every patch counted positive.
 
 use super::measure::Moments;
-use super::path::Path;
+use super::path::{Path, Stretch};
+use super::revolved::Revolved;
 use super::row::{Cuts, Row};
 use super::rule::{Area, Normal, Patch, Rule};
 use super::seeds::Seeds;
+use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::{Aabb, Dd, Real, Side, Similarity};
-use crate::nurbs::{BezierCell, MapMoments, NurbsError, NurbsSurface, NurbsVolume};
+use crate::nurbs::{BezierCell, MapMoments, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume};
 use crate::patch::{Cells, FaceSet, Preimage};
+use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region};
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -71,6 +76,8 @@ pub(crate) struct Nets {
     about: [f64; 3],
     area: Integral,
     fields: Vec<Field>,
+    /// What is turned, where the nets are proved to be so about the z axis.
+    turned: Option<(Region, Turn)>,
 }
 
 /// The image of one or several trivariate NURBS.
@@ -81,6 +88,8 @@ pub struct Patches {
     bounds: Aabb,
     /// Far wider than any rounding of the bounds, far narrower than the solid.
     margin: f64,
+    /// The same solid as a turned region, to the rounding of the nets, where they are proved to be one.
+    turned: Option<Revolved>,
 }
 
 impl Patches {
@@ -111,18 +120,42 @@ impl Patches {
             area.error += one.error;
         }
         area.error += f64::EPSILON * area.value * 4.0;
-        Ok(Self::placed(
+        let mut made = Self::placed(
             frame.clone(),
             Arc::new(Nets {
                 volumes,
-                cells,
                 faces,
                 moments,
                 about,
                 area,
                 fields,
+                turned: turned(&cells),
+                cells,
             }),
-        ))
+        );
+        if made.turned.as_ref().is_some_and(|t| !made.agrees(t)) {
+            made.turned = None;
+        }
+        Ok(made)
+    }
+
+    /// Whether a turned region has the volume, area and centroid of the nets: then no part of them overlaps, and the
+    /// surfaces are the same.
+    fn agrees(&self, turned: &Revolved) -> bool {
+        let (own, other) = (self.moments(), turned.moments());
+        let same = |a: Integral, b: Integral, size: f64| {
+            (a.value - b.value).abs() <= a.error + b.error + 1e-12 * size
+        };
+        let (volume, area) = (own.volume.value, own.area.value);
+        let reach = volume * self.bounds.longest_side();
+        let moved = (other.about - own.about).to_array();
+        same(own.volume, other.volume, volume)
+            && same(own.area, other.area, area)
+            && (0..3).all(|k| {
+                let first = other.first[k];
+                let value = first.value + other.volume.value * moved[k];
+                same(own.first[k], Integral { value, ..first }, reach)
+            })
     }
 
     fn placed(frame: Similarity, nets: Arc<Nets>) -> Self {
@@ -137,16 +170,27 @@ impl Patches {
             min: end(-1.0),
             max: end(1.0),
         };
+        let turned = nets.turned.as_ref().map(|(region, turn)| {
+            let frame = frame.with_local_unit(region.unit());
+            let (section, boundary) = (region.section().clone(), region.boundary().to_vec());
+            Revolved::new(frame, turn.clone(), section, boundary)
+        });
         Self {
             margin: 1e-9 * bounds.longest_side(),
             frame,
             nets,
             bounds,
+            turned,
         }
     }
 
     pub(crate) fn frame(&self) -> &Similarity {
         &self.frame
+    }
+
+    /// The same solid as a turned region: its surface is that of the nets to some ulps of their size and place.
+    pub(crate) fn turned(&self) -> Option<&Revolved> {
+        self.turned.as_ref()
     }
 
     /// The volumes, in local coordinates of their frame.
@@ -217,7 +261,10 @@ impl Patches {
         self.nets.cells.side(local.point, local.error, exact)
     }
 
-    pub(super) fn distance(&self, point: DVec3, _inside: bool, limit: f64) -> f64 {
+    pub(super) fn distance(&self, point: DVec3, inside: bool, limit: f64) -> f64 {
+        if let Some(turned) = &self.turned {
+            return turned.distance(point, inside, limit);
+        }
         let scale = self.frame.scale();
         let limit_here = limit / scale;
         let found = self
@@ -323,10 +370,21 @@ impl Patches {
     }
 
     pub(super) fn translated(&self, by: DVec3) -> Self {
-        Self::placed(self.frame.translated(by), self.nets.clone())
+        let mut moved = Self::placed(self.frame.translated(by), self.nets.clone());
+        if self.turned.is_none() {
+            moved.turned = None;
+        }
+        moved
     }
 
     /// The outer faces: lines of constant first parameter.
+    /// Whether the surface may come within `margin` (scene units) of a stretch of a path, given in local coordinates.
+    pub(super) fn may_meet(&self, stretch: &Stretch, margin: f64) -> bool {
+        let Aabb { min, max } = stretch.bounds();
+        let margin = margin / self.frame.scale();
+        self.nets.faces.may_touch(min - margin, max + margin)
+    }
+
     pub(super) fn patches(&self, _seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
         let faces = 0..self.nets.faces.faces().len();
         let cuts = || (0..=8).map(|k| f64::from(k) / 8.0).collect();
@@ -368,6 +426,22 @@ impl Patches {
             area: Area::OfNormal,
         })
     }
+}
+
+/// The region that is turned, where the nets show one about the z axis.
+fn turned(cells: &Cells) -> Option<(Region, Turn)> {
+    let (outlines, [from, degrees]) = cells.outlines()?;
+    let curve = |c: &NurbsCurve<2>| ProfileCurve::Nurbs {
+        degree: c.degree(),
+        knots: c.knots().knots().to_vec(),
+        points: c.control_points().to_vec(),
+        weights: c.weights().to_vec(),
+    };
+    let loops: Vec<ProfileLoop> = (outlines.iter())
+        .map(|curves| curves.iter().map(curve).collect())
+        .collect();
+    let region = Region::new(&loops, Boundary::Closed, Fill::NonZero).ok()?;
+    Some((region, Turn::new(from, degrees)))
 }
 
 fn add(sum: &mut MapMoments, one: &MapMoments) {
@@ -481,6 +555,42 @@ impl FaceLine {
     }
 
     /// Length of the control polygon.
+    /// The same line in a body's own coordinates.
+    pub(super) fn placed(&self, frame: &Similarity) -> Self {
+        let turned = |h: &[f64; 4]| {
+            let v = frame.vector_to_local(xyz(*h));
+            [v.x, v.y, v.z, h[3]]
+        };
+        Self {
+            points: self.points.iter().map(turned).collect(),
+            slopes: self.slopes.iter().map(turned).collect(),
+            origin: frame.to_local(self.origin).point,
+        }
+    }
+
+    /// The control points of the part between two parameters: it lies in their convex hull.
+    pub(super) fn hull(&self, [a, b]: [f64; 2]) -> SmallVec<[DVec3; 8]> {
+        let mut row: SmallVec<[[f64; 4]; 8]> = self.points.clone();
+        let n = row.len();
+        if b < 1.0 {
+            for level in 1..n {
+                for i in (level..n).rev() {
+                    row[i] = mix(row[i - 1], row[i], b);
+                }
+            }
+        }
+        if a > 0.0 {
+            let share = a / b;
+            for level in 1..n {
+                for i in 0..n - level {
+                    row[i] = mix(row[i], row[i + 1], share);
+                }
+            }
+        }
+        let points = row.iter().map(|h| xyz(*h) / h[3] + self.origin);
+        points.collect()
+    }
+
     fn length(&self) -> f64 {
         let at = |h: &[f64; 4]| xyz(*h) / h[3];
         self.points

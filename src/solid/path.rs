@@ -48,9 +48,17 @@ pub(super) struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
-    /// Bounds of ρ and z over the stretch, by Taylor's formula.
+    fn range(&self) -> [f64; 2] {
+        [self.middle - self.half, self.middle + self.half]
+    }
+
+    /// Bounds of ρ and z over the stretch: of a line on a patch by the hull of its control points, else by
+    /// Taylor's formula.
     pub(super) fn reach(&self) -> Reach {
         let (path, half) = (self.path, self.half);
+        if let Path::Face { line, off } = path {
+            return reach_of_hull(&line.hull(self.range()), off.abs());
+        }
         let p = path.at(self.middle);
         let (d, bend) = path.slopes(self.middle);
         let flat = DVec2::new(p.x, p.y);
@@ -79,6 +87,14 @@ impl Stretch<'_> {
         let Turn::Partial(wedge) = turn else {
             return false;
         };
+        if let Path::Face { line, off } = self.path {
+            let (hull, room) = (line.hull(self.range()), off.abs() + margin);
+            return wedge.directions().iter().any(|d| {
+                let flat = || hull.iter().map(|p| DVec2::new(p.x, p.y));
+                let aside = flat().any(|p| d.perp_dot(p) <= room);
+                aside && flat().any(|p| d.perp_dot(p) >= -room) && flat().any(|p| d.dot(p) >= -room)
+            });
+        }
         let p = self.path.at(self.middle);
         let (velocity, bend) = self.path.slopes(self.middle);
         let flat = DVec2::new(p.x, p.y);
@@ -93,13 +109,38 @@ impl Stretch<'_> {
 
     /// A box around the stretch.
     pub(super) fn bounds(&self) -> Aabb {
-        let range = [self.middle - self.half, self.middle + self.half];
+        let range = self.range();
+        if let Path::Face { line, off } = self.path {
+            let hull = line.hull(range);
+            let ends = |f: fn(DVec3, DVec3) -> DVec3| hull.iter().copied().reduce(f);
+            let (min, max) = (ends(DVec3::min), ends(DVec3::max));
+            return Aabb {
+                min: min.unwrap_or(DVec3::NEG_INFINITY) - off.abs(),
+                max: max.unwrap_or(DVec3::INFINITY) + off.abs(),
+            };
+        }
         let furthest =
             |sign: f64| DVec3::from_array(DVec3::AXES.map(|e| self.path.support(e * sign, range)));
         Aabb {
             min: -furthest(-1.0),
             max: furthest(1.0),
         }
+    }
+}
+
+/// Bounds of (ρ, z) over the convex hull of points, grown by `off`.
+fn reach_of_hull(hull: &[DVec3], off: f64) -> Reach {
+    let flat = |p: &DVec3| DVec2::new(p.x, p.y);
+    // ρ is convex, and a linear function of the plane along a unit vector is never above it.
+    let most = hull.iter().map(|p| flat(p).length()).fold(0.0, f64::max);
+    let sum: DVec2 = hull.iter().map(flat).sum();
+    let towards = sum.normalize_or_zero();
+    let least = (hull.iter().map(|p| flat(p).dot(towards))).fold(f64::INFINITY, f64::min);
+    let low = hull.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let high = hull.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
+    Reach {
+        r: [(least - off).max(0.0), most + off],
+        z: [low - off, high + off],
     }
 }
 
@@ -189,8 +230,10 @@ impl Path {
                 start: point(*start),
                 along: vector(*along),
             },
-            // Free paths are only asked for their points, in the world.
-            Self::Face { .. } => self.clone(),
+            Self::Face { line, off } => Self::Face {
+                line: Arc::new(line.placed(frame)),
+                off: *off / frame.scale(),
+            },
         }
     }
 
@@ -231,10 +274,19 @@ impl Path {
         let local = self.local(body);
         let mut along = false;
         let speed = self.speed();
-        let signed = |s: f64| {
+        // Distances up to a limit: where one is only compared, farther faces need no search.
+        let distance = |s: f64, limit: f64| {
+            let p = self.at(s);
+            match body {
+                // The same on both sides, and the side is the dearer question.
+                Body::Patches(b) => b.distance(p, false, limit),
+                _ => body.distance(p, body.side(p) != Side::Outside, limit),
+            }
+        };
+        let signed = |s: f64, limit: f64| {
             let p = self.at(s);
             let outside = body.side(p) == Side::Outside;
-            let d = body.distance(p, !outside, f64::INFINITY);
+            let d = body.distance(p, !outside, limit);
             if outside {
                 d.max(f64::MIN_POSITIVE)
             } else {
@@ -255,26 +307,36 @@ impl Path {
                 along = along || body.may_meet(&stretch, near);
                 continue;
             }
-            let middle = signed(m);
+            let small = h <= TRUST || seen > MANY && h <= COARSE;
+            let clear = speed * h * (1.0 + 1e-9);
+            // Distances are proved to less than that.
+            let limit = clear + 4.0 * near;
+            let middle = if small {
+                signed(m, limit)
+            } else {
+                distance(m, limit)
+            };
             along |= middle.abs() <= near && h > FLOOR;
-            if middle.abs() >= speed * h * (1.0 + 1e-9) {
+            if middle.abs() >= clear {
                 continue;
             }
-            let small = h <= TRUST || seen > MANY && h <= COARSE;
             let mut values = None;
             if small {
-                let [fa, fb] = ends.unwrap_or_else(|| [signed(a), signed(b)]);
+                // What is so near to the middle is at most this far.
+                let limit = middle.abs() + limit;
+                let [fa, fb] = ends.unwrap_or_else(|| [a, b].map(|s| signed(s, limit)));
                 values = Some([fa, middle, fb]);
+                let within = |s: f64| signed(s, limit);
                 let fine = h <= FLOOR || seen > MANY || !(m > a && m < b);
                 match parabola([fa, middle, fb]) {
                     Crossings::None => continue,
                     Crossings::One => {
-                        out.push(root(&signed, [a, b], [fa, fb], 0.25 * margin));
+                        out.push(root(&within, [a, b], [fa, fb], 0.25 * margin));
                         continue;
                     }
                     Crossings::Unknown if fine => {
                         if (fa < 0.0) != (fb < 0.0) {
-                            out.push(root(&signed, [a, b], [fa, fb], 0.25 * margin));
+                            out.push(root(&within, [a, b], [fa, fb], 0.25 * margin));
                         }
                         continue;
                     }
