@@ -58,25 +58,29 @@ impl Compression {
 
     /// The compression that `auto` stands for with these channels; every other is itself.
     ///
-    /// A slice of a ball, 512 x 512, one thread of a 2-core Xeon, release build,
-    /// `measure_compressions` below; file size over raw size, raw megabytes encoded in a second:
+    /// Five layers of `scenes/goblet.toml` at 512 voxels, 258 x 258 each, one thread of a 2-core
+    /// Xeon at 2 GHz, release build, `measure_compressions` below; file size over the size of the
+    /// samples, megabytes of samples encoded in a second:
     ///
     /// | channels | none | rle | zips | zip | piz | pxr24 |
     /// |---|---|---|---|---|---|---|
-    /// | sdf | 1.01 1041 | 1.01 187 | 1.01 21 | 0.98 20 | 0.79 18 | 0.23 57 |
-    /// | occupancy, fraction, sdf | 1.00 1202 | 0.49 260 | 0.42 44 | 0.40 42 | 0.34 39 | 0.10 93 |
-    /// | occupancy, fraction | 1.01 1055 | 0.14 299 | 0.023 78 | 0.010 146 | 0.076 69 | 0.009 171 |
-    /// | occupancy | 1.02 471 | 0.039 241 | 0.045 41 | 0.008 114 | 0.017 31 | 0.008 131 |
+    /// | occupancy | 1.03 8321 | 0.071 546 | 0.093 35 | 0.014 215 | 0.032 8 | 0.014 221 |
+    /// | fraction | 1.02 12381 | 0.083 583 | 0.083 58 | 0.040 203 | 0.220 10 | 0.034 132 |
+    /// | material | 1.02 12231 | 0.059 376 | 0.046 53 | 0.008 162 | 0.018 11 | 0.011 148 |
+    /// | sdf | 1.02 10986 | 1.02 287 | 1.02 12 | 0.99 17 | 0.90 6 | 0.29 42 |
+    /// | all four | 1.00 9741 | 0.33 323 | 0.32 32 | 0.30 38 | 0.29 17 | 0.10 70 |
     ///
-    /// The last bits of an f32 distance are noise to every lossless codec: zip saves 2 % and piz
-    /// 21 % of it, both at a fiftieth of the speed, so a stack with `sdf`, or with a channel of
-    /// unknown content, is left alone. Masks, fractions and ids shrink a hundredfold under zip, so
-    /// the disk has next to nothing to do; rle is twice as fast but leaves ten times the bytes.
+    /// The last bits of an f32 distance are noise to every lossless codec: zip saves 1 % of it and
+    /// piz 10 %, at less than a hundredth of the speed of `none`, so a stack with `sdf`, or with a
+    /// channel of unknown content, is left alone. Masks, fractions and ids shrink twelvefold under
+    /// rle, twice as fast as under zip, which shrinks them further, and a few threads of it feed as
+    /// many samples to the disk as a fast disk takes uncompressed ones: rle writes them soonest on
+    /// any disk that takes more than some 40 MB/s for each thread.
     ///
     /// ```
     /// # use voxlathe::io::exr::Compression;
     /// assert_eq!(Compression::Auto.resolve(["occupancy", "sdf"]), Compression::None);
-    /// assert_eq!(Compression::Auto.resolve(["occupancy", "fraction"]), Compression::Zip);
+    /// assert_eq!(Compression::Auto.resolve(["occupancy", "fraction"]), Compression::Rle);
     /// assert_eq!(Compression::Piz.resolve(["sdf"]), Compression::Piz);
     /// ```
     #[must_use]
@@ -86,7 +90,7 @@ impl Compression {
         }
         let compressible = |name: &str| matches!(name, "occupancy" | "fraction" | "material");
         if channels.into_iter().all(compressible) {
-            Self::Zip
+            Self::Rle
         } else {
             Self::None
         }
@@ -131,9 +135,11 @@ impl FromStr for Compression {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Layer, attributes};
-    use super::super::{LayerChannels, encode_layer};
+    use super::super::testing::attributes;
+    use super::super::{LayerChannels, LayerEncoder};
     use super::*;
+    use crate::sample::{LayerBuffers, LayerSampler, Selection};
+    use crate::scene::Scene;
 
     #[test]
     fn compression_names_come_back() {
@@ -153,62 +159,67 @@ mod tests {
     #[ignore = "a measurement"]
     #[allow(clippy::cast_precision_loss, reason = "only printed")]
     fn measure_compressions() {
-        let size = [512, 512];
-        let layer = Layer::ball(size);
-        let all = layer.channels();
-        let masks = LayerChannels { sdf: None, ..all };
-        let mut table = String::new();
-        for (name, channels) in [
-            (
-                "sdf",
-                LayerChannels {
-                    sdf: all.sdf,
-                    ..Default::default()
-                },
-            ),
-            (
-                "occupancy fraction sdf",
-                LayerChannels {
-                    material: None,
-                    ..all
-                },
-            ),
-            (
-                "occupancy fraction",
-                LayerChannels {
-                    material: None,
-                    ..masks
-                },
-            ),
-            (
-                "occupancy",
-                LayerChannels {
-                    occupancy: all.occupancy,
-                    ..Default::default()
-                },
-            ),
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/goblet.toml");
+        let scene = Scene::load_with(path, &["grid.resolution=512".to_owned()]).unwrap();
+        let grid = scene.grid().unwrap();
+        let [nx, ny, nz] = grid.dims();
+        let selection = Selection {
+            fraction: true,
+            sdf: true,
+            material: true,
+            band: None,
+        };
+        let sampler = LayerSampler::new(scene.assembly(), &grid, selection);
+        let layers: Vec<LayerBuffers> = (1..6)
+            .map(|i| {
+                let mut layer = LayerBuffers::default();
+                sampler.sample(nz * i / 6, &mut layer);
+                layer
+            })
+            .collect();
+        let mut encoder = LayerEncoder::default();
+        for wanted in [
+            &["occupancy"][..],
+            &["fraction"],
+            &["material"],
+            &["sdf"],
+            &["occupancy", "fraction", "sdf", "material"],
         ] {
-            let list = channels.list();
-            let raw: usize = list.iter().map(|c| c.1.len() * c.1.kind().bytes()).sum();
             for compression in &Compression::ALL[..6] {
-                let rounds = 5;
-                let mut best = f64::INFINITY;
-                let mut bytes = Vec::new();
-                for _ in 0..rounds {
-                    let start = std::time::Instant::now();
-                    bytes = encode_layer(size, &list, &attributes(), *compression).unwrap();
-                    best = best.min(start.elapsed().as_secs_f64());
+                let (mut samples, mut file, mut seconds) = (0, 0, 0.0);
+                for layer in &layers {
+                    let mut list = LayerChannels {
+                        occupancy: Some(&layer.occupancy),
+                        fraction: Some(&layer.fraction),
+                        sdf: Some(&layer.sdf),
+                        material: Some(&layer.material),
+                    }
+                    .list();
+                    list.retain(|c| wanted.contains(&c.0));
+                    samples += list
+                        .iter()
+                        .map(|c| c.1.len() * c.1.kind().bytes())
+                        .sum::<usize>();
+                    let mut best = f64::INFINITY;
+                    for round in 0..4 {
+                        let start = std::time::Instant::now();
+                        let bytes = encoder
+                            .encode([nx, ny], &list, &attributes(), *compression)
+                            .unwrap();
+                        best = best.min(start.elapsed().as_secs_f64());
+                        if round == 0 {
+                            file += bytes.len();
+                        }
+                    }
+                    seconds += best;
                 }
-                use std::fmt::Write as _;
-                writeln!(
-                    table,
-                    "{name:24} {compression:6} ratio {:.3}  {:6.0} MB/s",
-                    bytes.len() as f64 / raw as f64,
-                    raw as f64 / best / 1e6
-                )
-                .unwrap();
+                eprintln!(
+                    "{:32} {compression:6} ratio {:.3}  {:6.0} MB/s",
+                    wanted.join(" "),
+                    file as f64 / samples as f64,
+                    samples as f64 / seconds / 1e6
+                );
             }
         }
-        eprintln!("{table}");
     }
 }

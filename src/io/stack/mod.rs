@@ -403,22 +403,30 @@ impl StackWriter {
     }
 }
 
+/// Bytes of a slice's header and its record in the manifest, with room to spare.
+const HEADER_AND_RECORD: u64 = 4096;
+
 /// Bytes that a stack of these channels takes at most, to compare with
 /// [`available_bytes`](super::directory::available_bytes) before any work.
+#[must_use]
+pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    largest_slice_bytes(grid, channels)
+        .saturating_mul(grid.dims()[2] as u64)
+        .saturating_add(HEADER_AND_RECORD)
+}
+
+/// Bytes that one slice takes at most.
 ///
 /// No slice is larger than its samples with the offsets and sizes of its lines and its header.
 #[must_use]
-pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
-    const HEADER_AND_RECORD: u64 = 4096;
-    let [nx, ny, nz] = grid.dims().map(|d| d as u64);
+pub fn largest_slice_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    let [nx, ny, _] = grid.dims().map(|d| d as u64);
     let pixel: u64 = channels.iter().map(|c| c.kind.bytes() as u64).sum();
     // Each line has an offset of 8 bytes, its row and its size of 4 bytes each.
-    let slice = nx
-        .saturating_mul(pixel)
+    nx.saturating_mul(pixel)
         .saturating_add(16)
         .saturating_mul(ny)
-        .saturating_add(HEADER_AND_RECORD);
-    slice.saturating_mul(nz).saturating_add(HEADER_AND_RECORD)
+        .saturating_add(HEADER_AND_RECORD)
 }
 
 fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {
