@@ -7,7 +7,7 @@
 //! ```
 //!
 //! A band is about 128 KiB. Without compression the place of every line is known beforehand and
-//! the bytes are assembled here; with it the `exr` crate compresses the blocks. A
+//! the bytes are assembled here, as are runs; the `exr` crate compresses every other kind. A
 //! [`LayerEncoder`] keeps its buffer from layer to layer, so that no layer waits for memory pages,
 //! and works on the calling thread alone: layers, not lines, are what threads share.
 
@@ -19,6 +19,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::{Compression as ExrCompression, Vec2};
 
 use super::header::{append_header, check_channel_name, header};
+use super::runs::Runs;
 use super::{Attributes, Compression, ExrError, Samples};
 
 /// The largest side of an image: OpenEXR's windows are signed 32-bit and readers want headroom.
@@ -50,6 +51,8 @@ const BLOCK_HEAD: usize = 8;
 pub struct LayerEncoder {
     bytes: Vec<u8>,
     head: Vec<u8>,
+    block: Vec<u8>,
+    runs: Runs,
 }
 
 /// A layer's bytes and their digest.
@@ -67,6 +70,29 @@ struct Plan<'a> {
     /// Bytes of a line of the image.
     line: usize,
     header: Header,
+}
+
+impl<'a> Plan<'a> {
+    /// Fills `out` with these lines of the image: for each the samples of one channel after the
+    /// other, in the byte order of `fill`.
+    fn fill(
+        &self,
+        lines: Range<usize>,
+        mut out: &mut [u8],
+        fill: impl Fn(&Samples<'a>, Range<usize>, &mut [u8]),
+    ) {
+        let width = self.size[0];
+        for y in lines {
+            for (_, samples) in &self.channels {
+                let part = out.split_off_mut(..width * samples.kind().bytes());
+                fill(
+                    samples,
+                    y * width..(y + 1) * width,
+                    part.unwrap_or_default(),
+                );
+            }
+        }
+    }
 }
 
 impl LayerEncoder {
@@ -128,7 +154,7 @@ impl LayerEncoder {
         mut look: impl FnMut(Range<usize>) -> Result<(), E>,
         mut digest: Option<&mut Digest>,
     ) -> Result<(), E> {
-        let [width, height] = plan.size;
+        let height = plan.size[1];
         let block = BLOCK_HEAD + plan.line;
         let start = self.head.len() + 8 * height;
         // Whatever a former layer left is written over.
@@ -146,12 +172,9 @@ impl LayerEncoder {
             look(first..last)?;
             let band = start + first * block..start + last * block;
             for (y, out) in (first..last).zip(self.bytes[band.clone()].chunks_exact_mut(block)) {
-                let (head, mut rest) = out.split_at_mut(BLOCK_HEAD);
+                let (head, line) = out.split_at_mut(BLOCK_HEAD);
                 head.copy_from_slice(&block_head(y, plan.line));
-                for (_, samples) in &plan.channels {
-                    let part = rest.split_off_mut(..width * samples.kind().bytes());
-                    samples.fill_le(y * width..(y + 1) * width, part.unwrap_or_default());
-                }
+                plan.fill(y..y + 1, line, Samples::fill_le);
             }
             if let Some(digest) = &mut digest {
                 digest.reached(&self.bytes, band.end);
@@ -165,7 +188,7 @@ impl LayerEncoder {
         plan: &Plan<'_>,
         mut look: impl FnMut(Range<usize>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let [width, height] = plan.size;
+        let height = plan.size[1];
         let lines = plan.header.compression.scan_lines_per_block().min(height);
         let table = self.head.len();
         self.bytes.clear();
@@ -174,20 +197,22 @@ impl LayerEncoder {
         for (index, first) in (0..height).step_by(lines).enumerate() {
             let last = (first + lines).min(height);
             look(first..last)?;
-            let mut data = vec![0; (last - first) * plan.line];
-            let mut rest = data.as_mut_slice();
-            for y in first..last {
-                for (_, samples) in &plan.channels {
-                    let part = rest.split_off_mut(..width * samples.kind().bytes());
-                    samples.fill_native(y * width..(y + 1) * width, part.unwrap_or_default());
-                }
+            let at = self.bytes.len();
+            self.bytes[table + 8 * index..][..8].copy_from_slice(&(at as u64).to_le_bytes());
+            // Its size is known once it is there.
+            self.bytes.extend_from_slice(&[0; BLOCK_HEAD]);
+            if plan.header.compression == ExrCompression::RLE {
+                self.block.resize((last - first) * plan.line, 0);
+                plan.fill(first..last, &mut self.block, Samples::fill_le);
+                self.runs.append(&self.block, &mut self.bytes);
+            } else {
+                let mut data = vec![0; (last - first) * plan.line];
+                plan.fill(first..last, &mut data, Samples::fill_native);
+                let pixels = compressed(&plan.header, [first, last - first], data)?;
+                self.bytes.extend_from_slice(&pixels);
             }
-            let pixels = compressed(&plan.header, [first, last - first], data)?;
-            let offset = (self.bytes.len() as u64).to_le_bytes();
-            self.bytes[table + 8 * index..][..8].copy_from_slice(&offset);
-            self.bytes
-                .extend_from_slice(&block_head(first, pixels.len()));
-            self.bytes.extend_from_slice(&pixels);
+            let head = block_head(first, self.bytes.len() - at - BLOCK_HEAD);
+            self.bytes[at..at + BLOCK_HEAD].copy_from_slice(&head);
         }
         Ok(())
     }

@@ -22,6 +22,7 @@ mod decode;
 mod encode;
 mod error;
 mod header;
+mod runs;
 mod samples;
 #[cfg(test)]
 mod testing;
