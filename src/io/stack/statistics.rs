@@ -179,7 +179,7 @@ fn extremes(values: &[f32]) -> (f32, f32, bool) {
             high[lane]
         };
         // 0 for what is finite, NaN for what is not.
-        nothing[lane] += value - value;
+        nothing[lane] += 0.0 * value;
     };
     for chunk in whole {
         for (lane, &value) in chunk.iter().enumerate() {
