@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::interrupt;
 use super::output::Console;
 use crate::grid::GridSpec;
-use crate::io::exr::{Compression, LayerChannels, SampleKind, encode_layer, layer_attributes};
+use crate::io::exr::{Compression, LayerChannels, LayerEncoder, SampleKind, layer_attributes};
 use crate::io::stack::{ChannelSpec, StackOptions, StackSummary, StackWriter};
 use crate::math::Kernel;
 use crate::nurbs::{BasisTable, KnotVector, tabulate};
@@ -319,15 +319,17 @@ impl Job<'_> {
         let times = timed(|| {
             layers
                 .par_iter()
-                .try_for_each(|(_, buffers)| {
+                .try_for_each_init(LayerEncoder::default, |encoder, (_, buffers)| {
                     let channels = LayerChannels {
                         occupancy: Some(&buffers.occupancy),
                         sdf: Some(&buffers.sdf),
                         ..LayerChannels::default()
                     };
                     let bytes =
-                        encode_layer([nx, ny], &channels.list(), &attributes, Compression::None);
-                    bytes.map(|b| drop(black_box(b)))
+                        encoder.encode([nx, ny], &channels.list(), &attributes, Compression::None);
+                    bytes.map(|b| {
+                        black_box(b);
+                    })
                 })
                 .map_err(|e| Failure::usage(e.to_string()))
         })?;

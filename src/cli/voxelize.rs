@@ -10,8 +10,10 @@ use crate::io::available_bytes;
 use crate::io::exr::{Compression, LayerChannels, SampleKind, Samples};
 use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
-    ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_stack_bytes,
+    ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_slice_bytes,
+    largest_stack_bytes,
 };
+use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{Certainty, Channel, LayerBuffers, LayerSampler, Selection, Tally};
 use crate::scene::{
@@ -24,13 +26,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Bytes in flight for each byte of a layer: the samples, their EXR form, and the encoder's blocks.
-const COPIES: u64 = 4;
-
 /// Everything decided before the first voxel.
 struct Plan {
     grid: GridSpec,
     selection: Selection,
+    kernel: Kernel,
     scalars: Vec<Scalar>,
     channels: Vec<ChannelSpec>,
     compression: Compression,
@@ -60,7 +60,7 @@ pub(super) fn run(
     for warning in scene.warnings() {
         console.warn(warning);
     }
-    let plan = plan(&scene, arguments)?;
+    let plan = plan(&scene, arguments, common.kernel()?)?;
     let prepare = start.elapsed().as_secs_f64();
     tracing::debug!(dims = ?plan.grid.dims(), workers = plan.workers, layer_bytes = plan.layer_bytes, "planned");
     if arguments.dry_run {
@@ -87,7 +87,11 @@ pub(super) fn run(
         preview(&scene, &plan, &writer)?;
     }
     let preview = drawn.elapsed().as_secs_f64();
-    let manifest = writer.finish(summary(&scene, &plan, &tally))?;
+    let summary = summary(&scene, &plan, &tally);
+    let placed = Instant::now();
+    let manifest = writer.finish(summary)?;
+    // The last files on their way to the disk, and the renames.
+    let write = write + placed.elapsed().as_secs_f64();
     if is_empty(&scene) {
         console.warn(NOTHING_LEFT);
     }
@@ -186,7 +190,7 @@ fn channels(scene: &Scene, given: &[String]) -> Result<Vec<ChannelModel>, Failur
     })
 }
 
-fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
+fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Failure> {
     let grid = scene.grid()?;
     let output = &scene.model().output;
     let units = scene.model().units.name();
@@ -211,10 +215,7 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
         CompressionName::Pxr24 => Compression::Pxr24,
     };
     let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
-    let scalar_bytes = 4 * (grid.layer_len() as u64).saturating_mul(scalars.len() as u64);
-    let layer_bytes = LayerSampler::bytes_per_layer(&grid, &selection)
-        .saturating_add(scalar_bytes)
-        .saturating_mul(COPIES);
+    let layer_bytes = layer_bytes(&grid, &selection, &channels, scalars.len(), compression);
     let limit = arguments.memory_limit.unwrap_or_else(default_memory_limit);
     if layer_bytes > limit {
         let [nx, ny, _] = grid.dims();
@@ -238,6 +239,7 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
     Ok(Plan {
         grid,
         selection,
+        kernel,
         scalars,
         channels,
         compression,
@@ -245,6 +247,26 @@ fn plan(scene: &Scene, arguments: &Voxelize) -> Result<Plan, Failure> {
         layer_bytes,
         stack_bytes,
     })
+}
+
+/// Memory that a worker takes: the samples of one layer, their EXR form and what makes it.
+fn layer_bytes(
+    grid: &GridSpec,
+    selection: &Selection,
+    channels: &[ChannelSpec],
+    scalars: usize,
+    compression: Compression,
+) -> u64 {
+    let scalars = 4 * (grid.layer_len() as u64).saturating_mul(scalars as u64);
+    // A compressed file grows as it comes, to at most twice its size, and is copied as it grows.
+    let copies = if compression == Compression::None {
+        1
+    } else {
+        3
+    };
+    LayerSampler::bytes_per_layer(grid, selection)
+        .saturating_add(scalars)
+        .saturating_add(largest_slice_bytes(grid, channels).saturating_mul(copies))
 }
 
 fn channel(model: &ChannelModel) -> Option<Channel> {
@@ -341,6 +363,9 @@ fn check_f32_range(scene: &Scene, grid: &GridSpec) -> Result<(), Error> {
 }
 
 /// Samples and writes layer by layer; each worker holds one layer at a time.
+///
+/// While one worker samples another encodes, and the writer's own threads wait for the disk, so the
+/// three overlap without a queue of layers in memory.
 fn stream(
     scene: &Scene,
     plan: &Plan,
@@ -349,6 +374,7 @@ fn stream(
 ) -> Result<(f64, f64, Tally), Failure> {
     let interrupted = || interrupt::check().is_err();
     let sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
+        .with_kernel(plan.kernel)
         .with_scalars(plan.scalars.clone())
         .with_cancel(&interrupted);
     let layers = plan.grid.dims()[2];

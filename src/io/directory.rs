@@ -2,8 +2,9 @@
 //!
 //! ```text
 //!   create   DIR/.voxlathe-staging-XXXXXX/      locked as long as the run lives
-//!   write    staging/slice-0003.exr, ...        each synced; any thread, any order
-//!   commit   remove DIR/manifest.json, then what it listed, then stale slices
+//!   write    staging/slice-0003.exr, ...        any thread, any order; each is synced meanwhile
+//!   commit   write staging/manifest.json        synced, as is every file before the next line
+//!            remove DIR/manifest.json, then what it listed, then stale slices
 //!            rename staging/* into DIR          sync DIR
 //!            rename staging/manifest.json       sync DIR: the stack is complete
 //!   drop     remove staging                     whatever was there stays
@@ -24,6 +25,7 @@ use tempfile::TempDir;
 
 use super::error::IoError;
 use super::manifest::{self, MANIFEST_NAME};
+use super::syncer::{Failure, Syncer};
 
 const STAGING_PREFIX: &str = ".voxlathe-staging-";
 
@@ -54,6 +56,7 @@ pub struct StackDirectory {
     replaced: BTreeSet<String>,
     had_manifest: bool,
     names: Mutex<BTreeSet<String>>,
+    syncer: Syncer,
     committed: bool,
 }
 
@@ -91,6 +94,7 @@ impl StackDirectory {
                 replaced: old.replaced,
                 had_manifest: old.had_manifest,
                 names: Mutex::default(),
+                syncer: Syncer::start(),
                 committed: false,
             }),
             Err(error) => {
@@ -106,12 +110,24 @@ impl StackDirectory {
         &self.path
     }
 
-    /// Writes and syncs one file; it appears under `name` at the commit.
+    /// Writes one file, which is synced while others are written; it appears under `name` at the
+    /// commit, which waits for the sync.
     ///
     /// # Errors
     /// [`IoError::FileName`] when the name is not a plain one, [`IoError::WrittenTwice`] and
-    /// [`IoError::Occupied`] when it is taken, [`IoError::Write`] when the system refuses.
+    /// [`IoError::Occupied`] when it is taken, [`IoError::Write`] when the system refuses this file
+    /// or has refused to sync one before it, which ends the stack.
     pub fn write_file(&self, name: &str, bytes: &[u8]) -> Result<WrittenFile, IoError> {
+        self.write_digested(name, bytes, blake3::hash(bytes))
+    }
+
+    /// As [`write_file`](Self::write_file), for bytes whose digest is known.
+    pub(super) fn write_digested(
+        &self,
+        name: &str,
+        bytes: &[u8],
+        blake3: blake3::Hash,
+    ) -> Result<WrittenFile, IoError> {
         if let Err(reason) = manifest::check_file_name(name) {
             return Err(IoError::FileName {
                 path: self.path.clone(),
@@ -126,19 +142,25 @@ impl StackDirectory {
         if !lock(&self.names).insert(name.into()) {
             return Err(IoError::WrittenTwice { path });
         }
-        self.stage(name, bytes)?;
+        let file = self.stage(name, bytes)?;
+        (self.syncer.sync(name, file)).map_err(|failure| self.not_synced(failure))?;
         Ok(WrittenFile {
             bytes: bytes.len() as u64,
-            blake3: blake3::hash(bytes).to_hex().to_string(),
+            blake3: blake3.to_hex().to_string(),
         })
     }
 
-    fn stage(&self, name: &str, bytes: &[u8]) -> Result<(), IoError> {
+    fn not_synced(&self, failure: Failure) -> IoError {
+        IoError::write(self.path.join(failure.name))(failure.error)
+    }
+
+    /// Writes a file into the staging directory; the caller syncs it.
+    fn stage(&self, name: &str, bytes: &[u8]) -> Result<File, IoError> {
         let staged = self.staging_path().join(name);
         let write = || {
             let mut file = File::create_new(&staged)?;
             file.write_all(bytes)?;
-            file.sync_all()
+            Ok(file)
         };
         write().map_err(|source| {
             // A partial file must not be there to be renamed; its name is free again.
@@ -159,7 +181,10 @@ impl StackDirectory {
     /// [`IoError::NotEmpty`] when another run has filled the directory meanwhile,
     /// [`IoError::Write`] when the system refuses. Either way no new file stays.
     pub fn commit(mut self, manifest: &[u8]) -> Result<(), IoError> {
-        self.stage(MANIFEST_NAME, manifest)?;
+        let file = self.stage(MANIFEST_NAME, manifest)?;
+        file.sync_all()
+            .map_err(IoError::write(self.path.join(MANIFEST_NAME)))?;
+        (self.syncer.finish()).map_err(|failure| self.not_synced(failure))?;
         self.check_unchanged()?;
         let mut placed = Vec::new();
         let result = self.place(&mut placed);
@@ -233,6 +258,7 @@ impl StackDirectory {
 
 impl Drop for StackDirectory {
     fn drop(&mut self) {
+        self.syncer.abandon();
         if let Some(staging) = self.staging.take() {
             // Nothing can be reported from here, and a leftover is removed by the next --force.
             let _ = staging.close();

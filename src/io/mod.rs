@@ -20,6 +20,7 @@ pub mod manifest;
 pub mod mesh;
 pub mod points;
 pub mod stack;
+mod syncer;
 pub mod verify;
 
 pub use directory::{StackDirectory, available_bytes, write_file_atomically};

@@ -16,23 +16,28 @@
 //! Sums and ranges are kept layer by layer and joined in the order of the layers, so they do not
 //! depend on which thread wrote what when.
 
+mod statistics;
+mod volumes;
+
+pub(super) use self::statistics::Statistics;
+pub use self::volumes::{StackChannel, write_stack};
+
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-
-use rayon::prelude::*;
 
 use super::directory::{StackDirectory, WrittenFile};
 use super::error::IoError;
 use super::exr::{
-    Compression, ExrError, LayerChannels, SIGN_CONVENTION, SampleKind, Samples, check_channel_name,
-    encode_layer, layer_attributes,
+    Compression, ExrError, LayerChannels, LayerEncoder, SIGN_CONVENTION, SampleKind, Samples,
+    check_channel_name, layer_attributes,
 };
 use super::manifest::{
     ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, MaterialVolume,
     SCHEMA, slice_name,
 };
-use crate::grid::{GridSpec, Volume};
+use crate::grid::GridSpec;
 
 /// A channel that each layer of a stack has.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -137,6 +142,21 @@ pub struct StackWriter {
     options: StackOptions,
     compression: Compression,
     written: Mutex<Written>,
+    /// Buffers that no thread is using: as many as threads have ever written at the same time.
+    encoders: Mutex<Vec<LayerEncoder>>,
+}
+
+/// Why a layer is not written.
+enum Refusal {
+    Exr(ExrError),
+    /// What is wrong with a sample.
+    Sample(String),
+}
+
+impl From<ExrError> for Refusal {
+    fn from(error: ExrError) -> Self {
+        Self::Exr(error)
+    }
 }
 
 #[derive(Debug, Default)]
@@ -170,6 +190,7 @@ impl StackWriter {
             channels,
             options,
             written: Mutex::default(),
+            encoders: Mutex::default(),
         })
     }
 
@@ -204,31 +225,11 @@ impl StackWriter {
         }
         let name = slice_name(k, layers);
         let path = self.directory.path().join(&name);
-        let mut statistics = Vec::with_capacity(self.channels.len());
-        for channel in &self.channels {
-            let found = layer.iter().find(|c| c.0 == channel.name).map(|c| c.1);
-            let mismatch = |reason| IoError::Mismatch {
-                path: path.clone(),
-                reason,
-            };
-            let samples = found.filter(|s| s.kind() == channel.kind).ok_or_else(|| {
-                mismatch(format!(
-                    "the layer has no channel {:?} of type {:?}; give each layer every channel of the stack",
-                    channel.name, channel.kind
-                ))
-            })?;
-            statistics.push(Statistics::of(&channel.name, &samples, nx).map_err(mismatch)?);
-        }
-        if layer.len() != self.channels.len() {
-            return Err(IoError::Mismatch {
-                path,
-                reason: format!(
-                    "the layer has {} channels, the stack {}; declare every channel when the stack is created",
-                    layer.len(),
-                    self.channels.len()
-                ),
-            });
-        }
+        let mismatch = |reason| IoError::Mismatch {
+            path: path.clone(),
+            reason,
+        };
+        let samples = self.pick(layer).map_err(mismatch)?;
         let scene = self.options.scene.as_ref();
         let attributes = layer_attributes(
             &self.grid,
@@ -236,13 +237,55 @@ impl StackWriter {
             &self.options.units,
             scene.map(|s| (s.name.as_str(), s.hash.as_str())),
         );
-        let bytes = encode_layer([nx, ny], layer, &attributes, self.compression)
-            .map_err(|error| IoError::Exr { path, error })?;
-        let written = self.directory.write_file(&name, &bytes)?;
+        let mut statistics = vec![Statistics::NONE; samples.len()];
+        let look = |rows: Range<usize>| {
+            for ((channel, samples), found) in
+                self.channels.iter().zip(&samples).zip(&mut statistics)
+            {
+                (found.add(&channel.name, samples, rows.clone(), nx)).map_err(Refusal::Sample)?;
+            }
+            Ok(())
+        };
+        let mut encoder = self.encoders().pop().unwrap_or_default();
+        let written = encoder
+            .encode_watched([nx, ny], layer, &attributes, self.compression, look)
+            .map_err(|refusal| match refusal {
+                Refusal::Exr(error) => IoError::Exr {
+                    path: path.clone(),
+                    error,
+                },
+                Refusal::Sample(reason) => mismatch(reason),
+            })
+            .and_then(|file| (self.directory).write_digested(&name, file.bytes, file.blake3));
+        self.encoders().push(encoder);
+        let written = written?;
         let z = self.grid.centre_along(2, k);
         let record = file_record(name, Some((k, z)), written);
         self.written().layers.insert(k, (record, statistics));
         Ok(())
+    }
+
+    /// The layer's samples in the order of the stack's channels, or why it is not one of its layers.
+    fn pick<'a>(&self, layer: &[(&str, Samples<'a>)]) -> Result<Vec<Samples<'a>>, String> {
+        let samples = (self.channels.iter())
+            .map(|channel| {
+                let found = layer.iter().find(|c| c.0 == channel.name).map(|c| c.1);
+                found.filter(|s| s.kind() == channel.kind).ok_or_else(|| {
+                    format!(
+                        "the layer has no channel {:?} of type {:?}; give each layer every channel of the stack",
+                        channel.name, channel.kind
+                    )
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        if layer.len() != self.channels.len() {
+            return Err(format!(
+                "the layer has {} channels, the stack {}; declare every channel when the stack is created",
+                layer.len(),
+                self.channels.len()
+            ));
+        }
+        Ok(samples)
     }
 
     /// Writes a file beside the slices; the manifest lists it too.
@@ -349,28 +392,41 @@ impl StackWriter {
         Ok(manifest)
     }
 
+    fn encoders(&self) -> MutexGuard<'_, Vec<LayerEncoder>> {
+        // An encoder is in the list or it is not.
+        self.encoders.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn written(&self) -> MutexGuard<'_, Written> {
         // A record is inserted whole or not at all, also when another thread has panicked.
         self.written.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
+/// Bytes of a slice's header and its record in the manifest, with room to spare.
+const HEADER_AND_RECORD: u64 = 4096;
+
 /// Bytes that a stack of these channels takes at most, to compare with
 /// [`available_bytes`](super::directory::available_bytes) before any work.
+#[must_use]
+pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    largest_slice_bytes(grid, channels)
+        .saturating_mul(grid.dims()[2] as u64)
+        .saturating_add(HEADER_AND_RECORD)
+}
+
+/// Bytes that one slice takes at most.
 ///
 /// No slice is larger than its samples with the offsets and sizes of its lines and its header.
 #[must_use]
-pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
-    const HEADER_AND_RECORD: u64 = 4096;
-    let [nx, ny, nz] = grid.dims().map(|d| d as u64);
+pub fn largest_slice_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    let [nx, ny, _] = grid.dims().map(|d| d as u64);
     let pixel: u64 = channels.iter().map(|c| c.kind.bytes() as u64).sum();
     // Each line has an offset of 8 bytes, its row and its size of 4 bytes each.
-    let slice = nx
-        .saturating_mul(pixel)
+    nx.saturating_mul(pixel)
         .saturating_add(16)
         .saturating_mul(ny)
-        .saturating_add(HEADER_AND_RECORD);
-    slice.saturating_mul(nz).saturating_add(HEADER_AND_RECORD)
+        .saturating_add(HEADER_AND_RECORD)
 }
 
 fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {
@@ -398,216 +454,6 @@ fn file_record(name: String, layer: Option<(usize, f64)>, written: WrittenFile) 
     }
 }
 
-/// Range and sums of a channel in one layer or more.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Statistics {
-    min: f64,
-    max: f64,
-    /// Of halves, which are whole numbers.
-    count: u64,
-    /// Of `fraction`.
-    sum: f64,
-    infinite: u64,
-}
-
-impl Statistics {
-    const NONE: Self = Self {
-        min: f64::INFINITY,
-        max: f64::NEG_INFINITY,
-        count: 0,
-        sum: 0.0,
-        infinite: 0,
-    };
-
-    /// Of the samples in rows of `width`; what is wrong when they cannot be that channel's.
-    pub(super) fn of(name: &str, samples: &Samples<'_>, width: usize) -> Result<Self, String> {
-        let mut found = Self::NONE;
-        let place = |n: usize| format!("voxel ({}, {})", n % width.max(1), n / width.max(1));
-        match samples {
-            Samples::Half(values) => {
-                if let (Some(&min), Some(&max)) = (values.iter().min(), values.iter().max()) {
-                    found.include(f64::from(min), f64::from(max));
-                }
-                found.count = values.iter().map(|&v| u64::from(v)).sum();
-                if name == "occupancy"
-                    && let Some(n) = values.iter().position(|&v| v > 1)
-                {
-                    return Err(format!(
-                        "occupancy of {} is {}; it must be 0 or 1",
-                        place(n),
-                        values[n]
-                    ));
-                }
-            }
-            Samples::Uint(values) => {
-                if let (Some(&min), Some(&max)) = (values.iter().min(), values.iter().max()) {
-                    found.include(f64::from(min), f64::from(max));
-                }
-            }
-            Samples::Float(values) => {
-                // Comparisons without branches, so that the compiler uses its lanes.
-                let (mut min, mut max, mut all_finite) = (f32::INFINITY, f32::NEG_INFINITY, true);
-                for &value in *values {
-                    all_finite &= value.is_finite();
-                    min = if value < min { value } else { min };
-                    max = if value > max { value } else { max };
-                }
-                if !all_finite {
-                    if let Some(n) = values.iter().position(|v| v.is_nan()) {
-                        return Err(format!(
-                            "{name} of {} is NaN; every sample must be a number",
-                            place(n)
-                        ));
-                    }
-                    let finite = || values.iter().copied().filter(|v| v.is_finite());
-                    found.infinite = (values.len() - finite().count()) as u64;
-                    min = finite().fold(f32::INFINITY, f32::min);
-                    max = finite().fold(f32::NEG_INFINITY, f32::max);
-                }
-                found.include(f64::from(min), f64::from(max));
-                if name == "fraction" {
-                    if let Some(n) = values.iter().position(|v| !(0.0..=1.0).contains(v)) {
-                        return Err(format!(
-                            "fraction of {} is {}; it must be between 0 and 1",
-                            place(n),
-                            values[n]
-                        ));
-                    }
-                    found.sum = values.iter().map(|&v| f64::from(v)).sum();
-                }
-            }
-        }
-        Ok(found)
-    }
-
-    fn include(&mut self, min: f64, max: f64) {
-        self.min = self.min.min(min);
-        self.max = self.max.max(max);
-    }
-
-    /// Of several layers, in their order.
-    pub(super) fn join(layers: impl Iterator<Item = Self>) -> Self {
-        layers.fold(Self::NONE, |a, b| Self {
-            min: a.min.min(b.min),
-            max: a.max.max(b.max),
-            count: a.count + b.count,
-            sum: a.sum + b.sum,
-            infinite: a.infinite + b.infinite,
-        })
-    }
-
-    /// Least and greatest finite sample, where there is one.
-    pub(super) fn range(&self) -> Option<[f64; 2]> {
-        // A range of zeros has one sign, whatever the order of the samples.
-        (self.min <= self.max).then_some([self.min + 0.0, self.max + 0.0])
-    }
-}
-
-/// A volume that can be a channel of a stack.
-pub trait StackChannel: Sync {
-    /// The grid of the values.
-    fn grid(&self) -> &GridSpec;
-    /// The type of the samples in the file.
-    fn kind(&self) -> SampleKind;
-    /// The samples of layer `k`.
-    fn layer(&self, k: usize) -> Samples<'_>;
-}
-
-impl StackChannel for Volume<f32> {
-    fn grid(&self) -> &GridSpec {
-        self.grid()
-    }
-
-    fn kind(&self) -> SampleKind {
-        SampleKind::Float
-    }
-
-    fn layer(&self, k: usize) -> Samples<'_> {
-        Samples::Float(self.layer(k))
-    }
-}
-
-impl StackChannel for Volume<u8> {
-    fn grid(&self) -> &GridSpec {
-        self.grid()
-    }
-
-    fn kind(&self) -> SampleKind {
-        SampleKind::Half
-    }
-
-    fn layer(&self, k: usize) -> Samples<'_> {
-        Samples::Half(self.layer(k))
-    }
-}
-
-impl StackChannel for Volume<u32> {
-    fn grid(&self) -> &GridSpec {
-        self.grid()
-    }
-
-    fn kind(&self) -> SampleKind {
-        SampleKind::Uint
-    }
-
-    fn layer(&self, k: usize) -> Samples<'_> {
-        Samples::Uint(self.layer(k))
-    }
-}
-
-/// Writes volumes in memory as a stack in the new or empty directory `path`, in parallel.
-///
-/// Lengths are labelled `m`. Volumes of different types go together as `&dyn StackChannel`:
-///
-/// ```
-/// # use glam::DVec3;
-/// # use voxlathe::grid::{GridSpec, Volume};
-/// use voxlathe::io::exr::{StackChannel, write_stack};
-/// # let dir = tempfile::tempdir()?;
-/// # let out = dir.path().join("out");
-/// # let grid = GridSpec::new([2, 3, 5], DVec3::ZERO, DVec3::ONE)?;
-/// # let sdf = Volume::new(grid, vec![-0.5_f32; 30]);
-/// # let occupancy = Volume::new(grid, vec![1_u8; 30]);
-/// let channels: [(&str, &dyn StackChannel); 2] = [("sdf", &sdf), ("occupancy", &occupancy)];
-/// let manifest = write_stack(&out, &grid, &channels)?;
-/// assert_eq!(manifest.voxels_inside, Some(30));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// [`IoError::Mismatch`] when a volume has another grid, and as [`StackWriter`].
-pub fn write_stack<C: StackChannel + ?Sized>(
-    path: impl AsRef<Path>,
-    grid: &GridSpec,
-    channels: &[(&str, &C)],
-) -> Result<Manifest, IoError> {
-    let options = StackOptions::default();
-    let specs = channels
-        .iter()
-        .map(|(name, volume)| {
-            if volume.grid() == grid {
-                Ok(ChannelSpec::named(name, volume.kind(), &options.units))
-            } else {
-                Err(IoError::Mismatch {
-                    path: path.as_ref().into(),
-                    reason: format!(
-                        "channel {name:?} was sampled on another grid; sample every channel on the stack's"
-                    ),
-                })
-            }
-        })
-        .collect::<Result<_, _>>()?;
-    let writer = StackWriter::create(path, grid, specs, options)?;
-    (0..grid.dims()[2]).into_par_iter().try_for_each(|k| {
-        let layer: Vec<_> = channels
-            .iter()
-            .map(|(name, volume)| (*name, volume.layer(k)))
-            .collect();
-        writer.write_samples(k, &layer)
-    })?;
-    writer.finish(StackSummary::default())
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -615,7 +461,7 @@ pub(super) mod tests {
     use glam::DVec3;
     use std::fs;
 
-    const DIMS: [usize; 3] = [7, 13, 5];
+    pub(super) const DIMS: [usize; 3] = [7, 13, 5];
 
     pub(in super::super) fn grid() -> GridSpec {
         GridSpec::new(DIMS, DVec3::new(-0.1, 0.2, 0.3), DVec3::splat(0.5)).unwrap()
@@ -862,32 +708,5 @@ pub(super) mod tests {
         ] {
             assert_eq!(Statistics::of(name, &samples, 7), Err(reason.into()));
         }
-    }
-
-    #[test]
-    fn volumes_of_every_type_make_a_stack() {
-        let dir = tempfile::tempdir().unwrap();
-        let grid = grid();
-        let sdf = Volume::new(grid, vec![-1.0_f32; 455]);
-        let ids = Volume::new(grid, vec![7_u32; 455]);
-        let occupancy = Volume::new(grid, vec![1_u8; 455]);
-        write_stack(dir.path().join("a"), &grid, &[("sdf", &sdf)]).unwrap();
-        write_stack(
-            dir.path().join("b"),
-            &grid,
-            &[("ids", &ids), ("material", &ids)],
-        )
-        .unwrap();
-        let all: [(&str, &dyn StackChannel); 3] =
-            [("sdf", &sdf), ("material", &ids), ("occupancy", &occupancy)];
-        let manifest = write_stack(dir.path().join("c"), &grid, &all).unwrap();
-        assert_eq!(manifest.voxels_inside, Some(455));
-        assert_eq!(manifest.scene_hash, None);
-        let other = GridSpec::new(DIMS, DVec3::ZERO, DVec3::ONE).unwrap();
-        assert!(matches!(
-            write_stack(dir.path().join("d"), &other, &[("sdf", &sdf)]),
-            Err(IoError::Mismatch { .. })
-        ));
-        assert!(!dir.path().join("d").exists());
     }
 }
