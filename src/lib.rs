@@ -43,7 +43,8 @@
 //! | [`solid::Patches`] | images of trivariate NURBS | [`patch`], from the nets |
 //!
 //! * [`region`]: a profile's curves as bi-monotone rational pieces; membership by crossings,
-//!   certified closest points, the boundary of the filled region, its moments as line integrals.
+//!   certified closest points, the boundary of the filled region, its moments as line integrals; the boundary as arcs,
+//!   a quadtree of where the distance to them is smooth, and tables of it along one height.
 //! * [`patch`]: images of trivariate NURBS: membership by certified point inversion, and the faces that bound
 //!   them, for distances and rows.
 //! * [`solid`]: bodies placed and joined; bounds, volume, area, centroid and inertia, row spans, volume fractions
@@ -88,7 +89,8 @@
 //! with a bound on the rounding and, where the bound does not decide, in double-double; no
 //! tolerance takes part beyond the one that calls a point at 2^-88 of the profile on its boundary.
 //! Distances are minima over all stationary points of rational pieces, isolated by the signs of
-//! Bernstein coefficients. Fractions are integrals of closed-form areas. Volume, area and moments are line integrals along the
+//! Bernstein coefficients. Voxels of a solid with an upright axis take theirs from tables that are proved to be within a
+//! few 1e-5 of a voxel: distances to arcs that are proved near the profile, in cubics with a bound. Fractions are integrals of closed-form areas. Volume, area and moments are line integrals along the
 //! profile in double-double, with estimates of their errors. Nothing is sampled.
 //!
 //! For a volume the net is the solid: points are inverted in Bézier cells that are halved until the map is proved one

@@ -149,7 +149,9 @@ impl Chain {
                 };
             }
         }
-        Self { features }
+        Self {
+            features: in_order(&features),
+        }
     }
 
     /// Number of features.
@@ -265,18 +267,22 @@ impl Chain {
 
     /// The features of `list`, which rises, in runs that follow each other; `None` where some go round in a ring.
     pub(crate) fn runs(&self, list: &[u32]) -> Option<Vec<Vec<u32>>> {
-        let holds = |i: u32| i < AXIS && list.binary_search(&i).is_ok();
+        // Features are numbered in their order: what follows is the next in the list, but where a ring closes.
+        let place = |i: u32, likely: Option<usize>| {
+            let known = likely.filter(|&n| list.get(n) == Some(&i));
+            known.or_else(|| list.binary_search(&i).ok().filter(|_| i < AXIS))
+        };
         let mut runs = Vec::new();
         let mut seen = 0;
-        for &first in list
-            .iter()
-            .filter(|i| !holds(self.features[**i as usize].before))
-        {
+        for (n, &first) in list.iter().enumerate() {
+            if place(self.features[first as usize].before, n.checked_sub(1)).is_some() {
+                continue;
+            }
             let mut run = vec![first];
-            let mut next = self.features[first as usize].after;
-            while holds(next) {
-                run.push(next);
-                next = self.features[next as usize].after;
+            let mut at = n;
+            while let Some(next) = place(self.features[list[at] as usize].after, Some(at + 1)) {
+                run.push(list[next]);
+                at = next;
             }
             seen += run.len();
             runs.push(run);
@@ -330,6 +336,33 @@ impl Chain {
             k == 0.0 || clear(f.arc.from, f.arc.start) && clear(f.arc.to, f.arc.end)
         })
     }
+}
+
+/// The features numbered along their chains.
+fn in_order(features: &[Feature]) -> Vec<Feature> {
+    let mut number = vec![OPEN; features.len()];
+    let mut order = Vec::with_capacity(features.len());
+    let firsts = (0..features.len()).filter(|&i| features[i].before >= AXIS);
+    // What is left after the chains that start somewhere are rings.
+    for start in firsts.chain(0..features.len()) {
+        let mut at = start;
+        while number[at] == OPEN {
+            number[at] = u32::try_from(order.len()).unwrap_or(OPEN);
+            order.push(at);
+            match features[at].after {
+                next if next < AXIS => at = next as usize,
+                _ => break,
+            }
+        }
+    }
+    let renumbered = |i: u32| if i < AXIS { number[i as usize] } else { i };
+    (order.iter())
+        .map(|&i| Feature {
+            before: renumbered(features[i].before),
+            after: renumbered(features[i].after),
+            ..features[i]
+        })
+        .collect()
 }
 
 impl Arc {

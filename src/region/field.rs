@@ -30,6 +30,8 @@ pub(crate) struct MeridianField {
     leaves: Vec<Leaf>,
     /// The leaves' features.
     pool: Vec<u32>,
+    /// Their distances from the centres of those leaves that keep all of them, 0 for the others.
+    distances: Vec<f32>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -46,8 +48,9 @@ pub(crate) struct Leaf {
     start: u32,
     len: u32,
     /// Whether the features kept are one of each of its smooth runs, from which walking finds that run's nearest;
-    /// else they are all that may be nearest.
+    /// else they are all that may be nearest, the one nearest to the centre first.
     pub(crate) smooth: bool,
+    centre: [f64; 2],
 }
 
 /// The part of the half-plane that a field covers, in the region's unit.
@@ -100,6 +103,7 @@ impl MeridianField {
             quarters: Vec::new(),
             leaves: Vec::new(),
             pool: Vec::new(),
+            distances: Vec::new(),
         };
         let all: Vec<u32> = (0_u32..).take(field.chain.len()).collect();
         field.root = field.node([0, 0], field.levels, &all);
@@ -174,10 +178,16 @@ impl MeridianField {
             && runs.iter().all(|run| self.chain.is_smooth(run, &corners))
         {
             let middles: Vec<u32> = runs.iter().map(|run| run[run.len() / 2]).collect();
-            return self.add_leaf(&middles, true);
+            return self.add_leaf(&middles, None, centre);
         }
         if level == 0 {
-            return self.add_leaf(&kept, false);
+            let mut sorted: Vec<(u32, f64)> = (list.iter().copied())
+                .zip(distances)
+                .filter(|(_, d)| *d <= limit)
+                .collect();
+            sorted.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            let (kept, distances): (Vec<u32>, Vec<f64>) = sorted.into_iter().unzip();
+            return self.add_leaf(&kept, Some(&distances), centre);
         }
         let half = 1 << (level - 1);
         let quarters = [0, 1, 2, 3].map(|q: u32| {
@@ -188,16 +198,48 @@ impl MeridianField {
         Node::Quarters(u32::try_from(self.quarters.len() - 1).unwrap_or(u32::MAX))
     }
 
-    fn add_leaf(&mut self, list: &[u32], smooth: bool) -> Node {
+    /// Adds a leaf; with `distances` of all features that may be nearest, else of one of each smooth run.
+    fn add_leaf(&mut self, list: &[u32], distances: Option<&[f64]>, centre: [f64; 2]) -> Node {
         let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let leaf = Leaf {
             start: number(self.pool.len()),
             len: number(list.len()),
-            smooth,
+            smooth: distances.is_none(),
+            centre,
         };
         self.pool.extend_from_slice(list);
+        #[allow(clippy::cast_possible_truncation, reason = "a hair less is taken off")]
+        let lower = |d: &f64| (d * (1.0 - 1e-6)) as f32;
+        match distances {
+            Some(distances) => self.distances.extend(distances.iter().map(lower)),
+            None => self.distances.resize(self.pool.len(), 0.0),
+        }
         self.leaves.push(leaf);
         Node::Leaf(number(self.leaves.len() - 1))
+    }
+
+    /// The unsigned distance of a point of a leaf.
+    pub(crate) fn distance(&self, leaf: &Leaf, q: [f64; 2]) -> f64 {
+        let features = self.features(leaf);
+        if leaf.smooth {
+            let sizes = features.iter().map(|&i| {
+                let local = self.chain.local(self.chain.walk(i, q), q);
+                local.value.abs()
+            });
+            return sizes.fold(f64::INFINITY, f64::min);
+        }
+        let [x, z] = [q[0] - leaf.centre[0], q[1] - leaf.centre[1]];
+        // No feature is nearer to the point than to the centre by more than this.
+        let away = (x * x + z * z).sqrt() * (1.0 + 1e-9);
+        let mut nearest = f64::INFINITY;
+        let distances = &self.distances[leaf.start as usize..];
+        for (&i, &from_centre) in features.iter().zip(distances) {
+            if f64::from(from_centre) - away > nearest {
+                break;
+            }
+            nearest = nearest.min(self.chain.distance(i, q));
+        }
+        nearest
     }
 
     /// Calls `each(first, last, leaf)` for the leaves at height `z`, in the order of r; `first..last` are

@@ -8,7 +8,8 @@
 //! ```text
 //!   curves ──> pieces ──┬──> crossings   is a point of the half-plane inside?
 //!                       └──> boundary ──┬──> distance    how far is it?
-//!                                       └──> moments     how much is it?
+//!                                       ├──> moments     how much is it?
+//!                                       └──> arcs ──> chain ──> field ──> radial    how far, for many at once?
 //! ```
 
 mod arcs;

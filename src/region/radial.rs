@@ -155,15 +155,7 @@ impl RadialTable {
     /// The unsigned distance in scene units at `r` region units in a cell without a cubic.
     pub(crate) fn mended(&self, field: &MeridianField, cell: usize, r: f64) -> f64 {
         let leaf = field.leaf(self.leaves[cell]);
-        let (chain, q) = (field.chain(), [r, self.height]);
-        let distances = field.features(leaf).iter().map(|&i| {
-            if leaf.smooth {
-                chain.local(chain.walk(i, q), q).value.abs()
-            } else {
-                chain.distance(i, q)
-            }
-        });
-        distances.fold(f64::INFINITY, f64::min) * self.scale
+        field.distance(leaf, [r, self.height]) * self.scale
     }
 }
 

@@ -394,8 +394,8 @@ impl<'a> LayerSampler<'a> {
 
     /// Fills one layer of occupancy in a large buffer.
     pub(super) fn occupancy_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u8]) {
-        /// Voxels expanded at once, in the first cache.
-        const PART: usize = 1 << 12;
+        /// Voxels expanded together: much more than a line, much less than a cache.
+        const PART: usize = 1 << 15;
         if !self.layer_bits(k, scratch) {
             return;
         }

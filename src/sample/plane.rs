@@ -9,6 +9,8 @@ use rayon::prelude::*;
 
 /// Voxels for which one cell number is kept: lanes of that many read cells from it on.
 pub(super) const BLOCK: usize = 8;
+/// Radii kept of a row are a multiple of this; the last is repeated.
+pub(super) const LANES: usize = 16;
 /// Marks a block whose cells are too far apart for lanes to reach.
 pub(super) const SCATTERED: u32 = u32::MAX;
 /// Cells that lanes reach from a block's first.
@@ -25,8 +27,10 @@ pub(super) struct Plane {
     blocks: Vec<u32>,
     /// Rows, each with the one that mirrors it.
     rows: Vec<(usize, Option<usize>)>,
-    /// Radii of a row that are kept.
+    /// Voxels of a row that are kept.
     stored: usize,
+    /// The same, filled up to whole lanes.
+    padded: usize,
     /// Voxels of a row.
     columns: usize,
 }
@@ -64,11 +68,12 @@ impl Plane {
         } else {
             (0..ny).map(|j| (j, None)).collect()
         };
-        let width = stored.div_ceil(BLOCK);
-        let mut radii = vec![0; rows.len() * stored];
+        let padded = stored.next_multiple_of(LANES);
+        let width = padded / BLOCK;
+        let mut radii = vec![0; rows.len() * padded];
         let mut blocks = vec![0; rows.len() * width];
         let lines = radii
-            .par_chunks_mut(stored)
+            .par_chunks_mut(padded)
             .zip(blocks.par_chunks_mut(width));
         lines.zip(&rows).for_each(|((radii, blocks), &(j, _))| {
             for (radius, x) in radii.iter_mut().zip(&x) {
@@ -81,6 +86,8 @@ impl Plane {
                     *radius = ((x * x + y[j] * y[j]).sqrt() * PLACES + 0.5) as u32;
                 }
             }
+            let last = radii[stored - 1];
+            radii[stored..].fill(last);
             for (block, radii) in blocks.iter_mut().zip(radii.chunks(BLOCK)) {
                 let cells = || radii.iter().map(|r| r >> 16);
                 let least = cells().min().unwrap_or(0);
@@ -97,16 +104,19 @@ impl Plane {
             blocks,
             rows,
             stored,
+            padded,
             columns: nx,
         })
     }
 
     /// The rows to be computed: number, the one that mirrors it, and the radii of the stored part.
-    pub(super) fn rows(&self) -> impl Iterator<Item = (usize, Option<usize>, PlaneRow<'_>)> {
-        let width = self.stored.div_ceil(BLOCK);
+    pub(super) fn rows(
+        &self,
+    ) -> impl ExactSizeIterator<Item = (usize, Option<usize>, PlaneRow<'_>)> {
+        let (padded, width) = (self.padded, self.padded / BLOCK);
         (self.rows.iter().enumerate()).map(move |(n, &(j, twin))| {
             let row = PlaneRow {
-                radii: &self.radii[n * self.stored..(n + 1) * self.stored],
+                radii: &self.radii[n * padded..(n + 1) * padded],
                 blocks: &self.blocks[n * width..(n + 1) * width],
             };
             (j, twin, row)
@@ -132,14 +142,24 @@ impl Plane {
         }
     }
 
+    /// Whether rows mirror each other.
+    pub(super) fn has_twins(&self) -> bool {
+        self.rows[0].1.is_some()
+    }
+
+    /// The row that mirrors row `j`.
+    pub(super) fn twin(&self, j: usize) -> Option<usize> {
+        self.rows[j].1
+    }
+
     /// The voxel that mirrors voxel `i` of a row's stored part.
     pub(super) fn mirrored(&self, i: usize) -> Option<usize> {
         let twin = self.columns - 1 - i;
         (self.stored < self.columns && twin != i).then_some(twin)
     }
 
-    /// Radii kept of a row.
-    pub(super) fn stored(&self) -> usize {
-        self.stored
+    /// Voxels kept of a row, and radii: some of the last voxel's more.
+    pub(super) fn stored(&self) -> (usize, usize) {
+        (self.stored, self.padded)
     }
 }

@@ -15,7 +15,7 @@
 use super::bits;
 use super::layer::stored;
 use super::memory::copy_past_caches;
-use super::plane::{BLOCK, Plane};
+use super::plane::{BLOCK, Plane, PlaneRow};
 use super::spread::spread;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real};
@@ -29,6 +29,8 @@ const CUBICS: f64 = 3.5e-5;
 const NEAR: f64 = 2e-4;
 /// The most arcs a boundary is replaced by.
 const MOST_ARCS: usize = 20_000;
+/// Bytes written together past the caches: much more than a line, much less than a cache.
+const TOGETHER: usize = 1 << 16;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 
@@ -48,8 +50,11 @@ pub(super) struct RadialScratch {
     table: RadialTable,
     row: Vec<f32>,
     doubts: Vec<u8>,
-    /// Voxels of the row whose sign the exact path tells.
-    close: Vec<usize>,
+    /// Voxels of the layer whose sign the exact path tells.
+    close: Vec<[usize; 2]>,
+    /// Rows that wait to be written together: upwards from a row, and downwards to the row that mirrors it.
+    ahead: Vec<f32>,
+    behind: Vec<f32>,
 }
 
 /// Where and how a layer is written.
@@ -117,72 +122,112 @@ impl RadialSampler {
             band,
             past_caches,
         } = writing;
-        let nx = grid.dims()[0];
+        let [nx, ny, _] = grid.dims();
         let frame = body.frame();
         let z = frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
-        let RadialScratch {
-            table,
-            row,
-            doubts,
-            close,
-        } = scratch;
-        table.fill(&self.field, z, frame.scale(), self.tolerance);
-        let cell = self.field.cell();
-        let stored_columns = self.plane.stored();
-        row.resize(nx, 0.0);
-        doubts.resize(stored_columns.div_ceil(BLOCK), 0);
-        let exact = |i: usize, j: usize| {
-            let side = bits::get(inside, j * nx + i);
-            let distance = body.distance(grid.centre(i, j, k), side, band);
-            stored(signed(distance, side).clamp(-band, band))
-        };
+        scratch
+            .table
+            .fill(&self.field, z, frame.scale(), self.tolerance);
+        scratch.close.clear();
+        let (columns, padded) = self.plane.stored();
+        scratch.row.resize(nx.max(padded), 0.0);
+        scratch.doubts.resize(padded / BLOCK, 0);
+        // Rows wait for each other only where they are written past the caches.
+        let together = (TOGETHER / (4 * nx)).max(1);
+        scratch.ahead.resize(together * nx, 0.0);
+        scratch.behind.resize(together * nx, 0.0);
+        let (mut first, mut waiting) = (0, 0);
         for (j, twin, radii) in self.plane.rows() {
-            let coefficients = table.coefficients.each_ref().map(Vec::as_slice);
-            spread(
-                kernel,
-                radii,
-                coefficients,
-                self.near,
-                &mut row[..stored_columns],
-                doubts,
-            );
-            close.clear();
-            for (block, &marks) in doubts.iter().enumerate().filter(|(_, m)| **m != 0) {
-                let mut marks = marks;
-                while marks != 0 {
-                    let i = block * BLOCK + marks.trailing_zeros() as usize;
-                    marks &= marks - 1;
-                    let radius = radii.radii[i];
-                    if row[i].is_nan() {
-                        let r = f64::from(radius) * (cell / super::plane::PLACES);
-                        let distance = table.mended(&self.field, (radius >> 16) as usize, r);
-                        let side = bits::get(inside, j * nx + i);
-                        row[i] = stored(signed(distance, side));
-                    }
-                    if !(row[i].abs() >= self.near) {
-                        close.push(i);
-                    }
-                }
-            }
+            self.row(kernel, [j, nx], radii, inside, scratch);
+            let row = &mut scratch.row;
             if band.is_finite() {
-                clamp(&mut row[..stored_columns], stored(band));
+                clamp(&mut row[..columns], stored(band));
             }
-            self.plane.mirror(row);
-            for j in std::iter::once(j).chain(twin) {
-                let out = &mut out[j * nx..(j + 1) * nx];
-                if past_caches {
-                    copy_past_caches(
-                        kernel,
-                        bytemuck::cast_slice(row),
-                        bytemuck::cast_slice_mut(out),
-                    );
-                } else {
-                    out.copy_from_slice(row);
+            self.plane.mirror(&mut row[..nx]);
+            let row = &row[..nx];
+            if !past_caches {
+                for j in std::iter::once(j).chain(twin) {
+                    out[j * nx..(j + 1) * nx].copy_from_slice(row);
                 }
-                for &i in close.iter() {
-                    for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
-                        out[i] = exact(i, j);
-                    }
+                continue;
+            }
+            scratch.ahead[waiting * nx..(waiting + 1) * nx].copy_from_slice(row);
+            if twin.is_some() {
+                let at = (together - 1 - waiting) * nx;
+                scratch.behind[at..at + nx].copy_from_slice(row);
+            }
+            waiting += 1;
+            // A row without a twin among rows with twins is the last, in the middle.
+            let last = j + 1 == self.plane.rows().len();
+            if waiting < together && !last {
+                continue;
+            }
+            let mut put = |from: &[f32], row: usize| {
+                let to = &mut out[row * nx..row * nx + from.len()];
+                copy_past_caches(
+                    kernel,
+                    bytemuck::cast_slice(from),
+                    bytemuck::cast_slice_mut(to),
+                );
+            };
+            put(&scratch.ahead[..waiting * nx], first);
+            if self.plane.has_twins() {
+                let pairs = if twin.is_some() { waiting } else { waiting - 1 };
+                let from = (together - pairs) * nx;
+                put(&scratch.behind[from..], ny - first - pairs);
+            }
+            (first, waiting) = (j + 1, 0);
+        }
+        for &[i, j] in &scratch.close {
+            for j in std::iter::once(j).chain(self.plane.twin(j)) {
+                for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
+                    let side = bits::get(inside, j * nx + i);
+                    let distance = body.distance(grid.centre(i, j, k), side, band);
+                    out[j * nx + i] = stored(signed(distance, side).clamp(-band, band));
+                }
+            }
+        }
+    }
+
+    /// Fills the kept part of the scratch's row with that of row `j` of `nx` voxels.
+    fn row(
+        &self,
+        kernel: Kernel,
+        [j, nx]: [usize; 2],
+        radii: PlaneRow<'_>,
+        inside: &[u64],
+        scratch: &mut RadialScratch,
+    ) {
+        let (columns, padded) = self.plane.stored();
+        let (table, row) = (&scratch.table, &mut scratch.row);
+        let coefficients = table.coefficients.each_ref().map(Vec::as_slice);
+        let doubts = &mut scratch.doubts;
+        spread(
+            kernel,
+            radii,
+            coefficients,
+            self.near,
+            &mut row[..padded],
+            doubts,
+        );
+        let per_place = self.field.cell() / super::plane::PLACES;
+        for (block, &marks) in doubts.iter().enumerate().filter(|(_, m)| **m != 0) {
+            let mut marks = marks;
+            while marks != 0 {
+                let i = block * BLOCK + marks.trailing_zeros() as usize;
+                marks &= marks - 1;
+                if i >= columns {
+                    break;
+                }
+                let radius = radii.radii[i];
+                if row[i].is_nan() {
+                    let r = f64::from(radius) * per_place;
+                    let distance = table.mended(&self.field, (radius >> 16) as usize, r);
+                    let side = bits::get(inside, j * nx + i);
+                    row[i] = stored(signed(distance, side));
+                }
+                if !(row[i].abs() >= self.near) {
+                    scratch.close.push([i, j]);
                 }
             }
         }

@@ -33,7 +33,8 @@ pub(super) struct UprightBody {
 /// What one thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct UprightScratch {
-    ends: Vec<[i32; 4]>,
+    /// For each row: from and to, surely; and from and to, perhaps.
+    ends: [Vec<i32>; 4],
 }
 
 /// Rounding of a squared half chord, relative to its terms.
@@ -95,7 +96,8 @@ impl UprightBody {
             let beyond = rings.get(n + 1).is_some_and(|r| r.side != Side::Outside);
             let changes = (ring.side != Side::Outside) != beyond;
             self.ends(kernel, ring, &mut scratch.ends);
-            for (j, &[surely, before, perhaps, until]) in scratch.ends.iter().enumerate() {
+            for j in 0..self.squares.len() {
+                let [surely, before, perhaps, until] = scratch.ends.each_ref().map(|e| e[j]);
                 let (first, at) = (j * self.columns, |i: i32| usize::try_from(i).unwrap_or(0));
                 if changes {
                     bits::flip(words, first + at(surely), first + at(before));
@@ -122,17 +124,18 @@ impl UprightBody {
         }
     }
 
-    /// For each row the voxels within the ring's radius: from and to, surely; and from and to, perhaps.
-    fn ends(&self, kernel: Kernel, ring: &Ring, ends: &mut Vec<[i32; 4]>) {
-        ends.clear();
-        ends.resize(self.squares.len(), [0; 4]);
+    /// For each row the voxels within the ring's radius.
+    fn ends(&self, kernel: Kernel, ring: &Ring, ends: &mut [Vec<i32>; 4]) {
+        for list in &mut *ends {
+            list.resize(self.squares.len(), 0);
+        }
         let [low, high] = ring.radius;
         let (square, width) = (high * high, (high - low.max(0.0)) * (2.0 * high));
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^30")]
         let last = self.columns as f64;
         let job = Ends {
             squares: &self.squares,
-            ends,
+            ends: ends.each_mut().map(Vec::as_mut_slice),
             square,
             width,
             centre: self.centre,
@@ -150,7 +153,7 @@ impl UprightBody {
 /// One radius and all rows.
 struct Ends<'a> {
     squares: &'a [f64],
-    ends: &'a mut [[i32; 4]],
+    ends: [&'a mut [i32]; 4],
     square: f64,
     width: f64,
     centre: f64,
@@ -169,10 +172,14 @@ impl pulp::NullaryFnOnce for Ends<'_> {
 }
 
 impl Ends<'_> {
+    /// Lists of one length each, so that the compiler uses its lanes.
     #[inline(always)]
-    #[allow(clippy::cast_possible_truncation, reason = "clamped to the row")]
     fn run(self) {
-        for (ends, y2) in self.ends.iter_mut().zip(self.squares) {
+        let [a, b, c, d] = self.ends;
+        let n = self.squares.len();
+        let (a, b, c, d) = (&mut a[..n], &mut b[..n], &mut c[..n], &mut d[..n]);
+        for j in 0..n {
+            let y2 = self.squares[j];
             let difference = self.square - y2;
             let rounding = SQUARE_ROUNDING * (self.square + y2) + self.width;
             let most = (difference + rounding).max(0.0).sqrt() * self.per_length;
@@ -183,15 +190,18 @@ impl Ends<'_> {
             } else {
                 self.slack
             };
-            let place = |v: f64| v.max(0.0).min(self.last) as i32;
-            *ends = [
-                place((self.centre - least + self.slack).ceil()),
-                place((self.centre + least - self.slack).floor() + 1.0),
-                place((self.centre - most - reach).ceil()),
-                place((self.centre + most + reach).floor() + 1.0),
-            ];
+            a[j] = place((self.centre - least + self.slack).ceil(), self.last);
+            b[j] = place((self.centre + least - self.slack).floor() + 1.0, self.last);
+            c[j] = place((self.centre - most - reach).ceil(), self.last);
+            d[j] = place((self.centre + most + reach).floor() + 1.0, self.last);
         }
     }
+}
+
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "clamped to the row")]
+fn place(v: f64, last: f64) -> i32 {
+    v.max(0.0).min(last) as i32
 }
 
 /// The voxels of any layer that a body's wedge holds.
