@@ -3,7 +3,7 @@
 use super::bits;
 use super::fraction::FractionSampler;
 use super::memory::copy_past_caches;
-use super::radial::{RadialSampler, RadialScratch, Writing};
+use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
 use super::tally::{Certainty, Tally};
 use super::upright::{UprightBody, UprightScratch};
 use crate::grid::GridSpec;
@@ -347,7 +347,7 @@ impl<'a> LayerSampler<'a> {
             radial: own,
             ..
         } = scratch;
-        radial.layer(body, self.grid, k, inside, writing, own, out);
+        radial.layer(body, self.grid, KnownLayer { k, inside }, writing, own, out);
         true
     }
 

@@ -39,8 +39,9 @@ const FINEST: f64 = 1e-12;
 pub(super) struct RadialSampler {
     field: MeridianField,
     plane: Plane,
-    /// Local height of a grid height: exact.
+    /// What the cubics may err by, in the region's unit.
     tolerance: f64,
+    /// Distances below this are the exact path's, in scene units.
     near: f32,
 }
 
@@ -55,6 +56,14 @@ pub(super) struct RadialScratch {
     /// Rows that wait to be written together: upwards from a row, and downwards to the row that mirrors it.
     ahead: Vec<f32>,
     behind: Vec<f32>,
+}
+
+/// A layer whose membership is known.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KnownLayer<'a> {
+    pub(super) k: usize,
+    /// A bit for each voxel that is inside.
+    pub(super) inside: &'a [u64],
 }
 
 /// Where and how a layer is written.
@@ -106,13 +115,12 @@ impl RadialSampler {
         })
     }
 
-    /// Fills layer `k` with signed distances. `inside` has a bit for each voxel.
+    /// Fills a layer with signed distances.
     pub(super) fn layer(
         &self,
         body: &Revolved,
         grid: &GridSpec,
-        k: usize,
-        inside: &[u64],
+        known: KnownLayer<'_>,
         writing: Writing,
         scratch: &mut RadialScratch,
         out: &mut [f32],
@@ -122,6 +130,7 @@ impl RadialSampler {
             band,
             past_caches,
         } = writing;
+        let KnownLayer { k, inside } = known;
         let [nx, ny, _] = grid.dims();
         let frame = body.frame();
         let z = frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
