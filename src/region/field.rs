@@ -32,6 +32,8 @@ pub(crate) struct MeridianField {
     pool: Vec<u32>,
     /// Their distances from the centres of those leaves that keep all of them, 0 for the others.
     distances: Vec<f32>,
+    /// Features looked at so far.
+    work: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -68,11 +70,14 @@ pub(crate) struct Extent {
 pub(crate) const MOST_RUNS: usize = 4;
 /// Levels up to which a cell may have as many runs as the place in the list, from one run on.
 const LEVELS_OF_RUNS: [u32; MOST_RUNS] = [u32::MAX, 3, 2, 1];
+/// The most features looked at, over all cells: a fraction of a second, and a bound on the memory. A boundary that takes more
+/// has detail finer than the cells almost everywhere.
+const MOST_WORK: usize = 20_000_000;
 /// The most cells along a side of the rectangle.
 pub(crate) const MOST_CELLS: f64 = 32_768.0;
 
 impl MeridianField {
-    /// The field of a boundary over `extent`; `None` where that has too many cells.
+    /// The field of a boundary over `extent`; `None` where that has too many cells or they too many features.
     pub(crate) fn new(chain: Chain, extent: Extent) -> Option<Self> {
         let Extent { r, z, cell } = extent;
         let first_r = (r[0] / cell).floor();
@@ -104,10 +109,11 @@ impl MeridianField {
             leaves: Vec::new(),
             pool: Vec::new(),
             distances: Vec::new(),
+            work: 0,
         };
         let all: Vec<u32> = (0_u32..).take(field.chain.len()).collect();
         field.root = field.node([0, 0], field.levels, &all);
-        Some(field)
+        (field.work <= MOST_WORK).then_some(field)
     }
 
     /// The boundary's features.
@@ -146,6 +152,10 @@ impl MeridianField {
     /// The node whose lower corner is cell `at`, 2^level cells wide, of the features in `list`.
     fn node(&mut self, at: [u32; 2], level: u32, list: &[u32]) -> Node {
         if at[0] >= self.size[0] || at[1] >= self.size[1] {
+            return Node::Empty;
+        }
+        self.work += list.len();
+        if self.work > MOST_WORK {
             return Node::Empty;
         }
         let side = f64::from(1_u32 << level) * self.cell;

@@ -474,6 +474,24 @@ mod tests {
     }
 
     #[test]
+    fn detail_finer_than_the_cells_is_left_to_the_exact_path() {
+        // A saw of 3000 teeth, all within a cell.
+        let mut saw: Vec<[f64; 2]> = (0..6001_u32)
+            .map(|i| [1.0 + 1e-3 * f64::from(i % 2), 1e-6 * f64::from(i)])
+            .collect();
+        saw.extend([[2.0, 0.006], [2.0, 0.0], [1.0, 0.0]]);
+        let region = Region::new(&[vec![polyline(&saw)]], Boundary::Closed, Fill::EvenOdd);
+        let swept = swept(&region.expect("a region"));
+        let chain = Chain::new(&swept, 1e-9, 100_000, true).expect("few arcs");
+        let extent = Extent {
+            r: [0.0, 20.0],
+            z: [-20.0, 20.0],
+            cell: 0.01,
+        };
+        assert!(MeridianField::new(chain, extent).is_none());
+    }
+
+    #[test]
     fn a_jump_of_the_second_derivative_costs_no_more_than_assumed() {
         // d = (x - s)²/2 beyond s: the error of the cubic through its ends.
         let mut worst = [0.0_f64; 2];

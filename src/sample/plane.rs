@@ -42,12 +42,14 @@ pub(super) struct PlaneRow<'a> {
     pub(super) blocks: &'a [u32],
 }
 
+/// The most radii that are kept: 256 MiB.
+const MOST_RADII: usize = 1 << 26;
 /// Asymmetry that still counts as none, in cells.
 const ALIKE: f64 = 1e-7;
 
 impl Plane {
     /// The plane of `grid` around the axis through `axis`, in cells of `cell` scene units; `None` where a radius has
-    /// too many cells.
+    /// too many cells, or a layer too many voxels.
     pub(super) fn new(grid: &GridSpec, axis: [Dd; 2], cell: f64) -> Option<Self> {
         let [nx, ny, _] = grid.dims();
         let away = |c: usize, n: usize| -> Vec<f64> {
@@ -69,6 +71,13 @@ impl Plane {
             (0..ny).map(|j| (j, None)).collect()
         };
         let padded = stored.next_multiple_of(LANES);
+        if rows
+            .len()
+            .checked_mul(padded)
+            .is_none_or(|n| n > MOST_RADII)
+        {
+            return None;
+        }
         let width = padded / BLOCK;
         let mut radii = vec![0; rows.len() * padded];
         let mut blocks = vec![0; rows.len() * width];
