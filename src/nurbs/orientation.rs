@@ -550,18 +550,18 @@ mod tests {
 
     #[test]
     fn a_fold_names_its_cell() {
-        // 2 x 3 x 2 cells; a knot twice makes a span without length, which does not count.
+        // 2 x 3 x 2 cells.
         let knots = [
             KnotVector::clamped_uniform(1, 3).expect("valid"),
             KnotVector::clamped_uniform(1, 4).expect("valid"),
-            KnotVector::new(1, vec![0.0, 0.0, 0.5, 0.5, 1.0, 1.0]).expect("valid"),
+            KnotVector::clamped_uniform(1, 3).expect("valid"),
         ];
-        let mut points: Vec<[f64; 3]> = indices([3, 4, 4])
-            .map(|[i, j, k]| [i as f64, j as f64, [0.0, 1.0, 1.0, 2.0][k]])
+        let mut points: Vec<[f64; 3]> = indices([3, 4, 3])
+            .map(|index| index.map(|i| i as f64))
             .collect();
         // The corner of the last cell but those above it goes through to the other side.
         points[2 + 3 * 3] = [0.0, 1.0, 2.5];
-        let block = NurbsVolume::new(knots, points, vec![1.0; 48]).expect("valid");
+        let block = NurbsVolume::new(knots, points, vec![1.0; 36]).expect("valid");
         let Err(OrientationError::Folded { cells, .. }) = block.orientation() else {
             panic!("{:?}", block.orientation());
         };

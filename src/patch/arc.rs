@@ -250,8 +250,12 @@ mod tests {
                         let off = (there[0] - d[0] / 0.7).hypot(there[1] - d[1] / 0.7);
                         worst = worst.max(off);
                         assert!(off <= 1e-15, "curve {index} at {u}: {found}, {off:e}");
-                        assert!((found - u).abs() <= 4e-15, "curve {index} at {u}: {found}");
+                        // A short arc's parameter runs quickly.
+                        let bound = 4e-15 * (1.0 + 1.0 / arc.turned);
+                        assert!((found - u).abs() <= bound, "curve {index} at {u}: {found}");
                     }
+                    // Where pieces meet, in other degrees than 2.
+                    Found::Unclear if curve.knots().knots().contains(&u) => {}
                     other => panic!("curve {index} at {u}: {other:?}"),
                 }
             }

@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn what_turns_back_is_refused() {
         let (knots, mut points, weights) = wall();
-        points[2][0] = 20.0;
+        points[2][0] = 60.0;
         assert!(Monotone::new(&knots, &points, &weights).is_none());
         let level = vec![[1.0, 0.0]; 5];
         assert!(Monotone::new(&knots, &level, &weights).is_none());
