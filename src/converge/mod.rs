@@ -188,7 +188,8 @@ fn over_layers<T: Send>(
     stop: &(dyn Fn() -> Result<(), Error> + Sync),
     each: impl Fn(usize, &LayerBuffers) -> T + Sync,
 ) -> Result<Vec<T>, Error> {
-    let sampler = LayerSampler::new(scene.assembly(), grid, selection);
+    // What is studied is the grid, not the tables' tolerance.
+    let sampler = LayerSampler::new(scene.assembly(), grid, selection).with_exact_distances();
     (0..grid.dims()[2])
         .into_par_iter()
         .map_init(LayerBuffers::default, |buffers, k| {

@@ -182,6 +182,15 @@ impl<'a> LayerSampler<'a> {
         Self { kernel, ..self }
     }
 
+    /// A sampler that asks the exact path for every distance: slower, and within one ulp of it.
+    #[must_use]
+    pub fn with_exact_distances(self) -> Self {
+        Self {
+            radial: None,
+            ..self
+        }
+    }
+
     /// A sampler that fills [`LayerBuffers::scalars`] with these, too.
     #[must_use]
     pub fn with_scalars(self, scalars: Vec<Scalar>) -> Self {
