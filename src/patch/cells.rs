@@ -65,8 +65,8 @@ pub(super) struct Cell {
 /// assert_eq!(side(DVec3::new(0.5, 0.25, 0.125)), Side::Inside);
 /// assert_eq!(side(DVec3::new(0.5, 0.25, 1.0)), Side::On);
 /// assert_eq!(side(DVec3::new(0.5, 0.25, 1.0 + 1e-15)), Side::Outside);
-/// let found = cells.invert(DVec3::new(0.5, 0.25, 0.125));
-/// assert_eq!(found.map(|f| f.parameters), Some([0.5, 0.25, 0.125]));
+/// let found = cells.invert(DVec3::new(0.5, 0.25, 0.125)).expect("inside");
+/// assert!(DVec3::from_array(found.parameters).abs_diff_eq(DVec3::new(0.5, 0.25, 0.125), 1e-15));
 /// # Ok::<(), voxlathe::nurbs::NurbsError>(())
 /// ```
 #[derive(Debug, Clone)]

@@ -191,7 +191,9 @@ pub fn validate(
     let found: Vec<(Ballot, FieldChecks)> = match points {
         Points::Grid => {
             let selection = Selection::of(&[Channel::Sdf], None);
-            let sampler = LayerSampler::new(scene.assembly(), grid, selection);
+            // The field's checks know no tolerance of tables.
+            let sampler =
+                LayerSampler::new(scene.assembly(), grid, selection).with_exact_distances();
             (0..grid.dims()[2].div_ceil(SLAB))
                 .into_par_iter()
                 .map(|n| {
