@@ -56,6 +56,38 @@ kind = 'revolve'
 profile = 'star'
 ",
     ),
+    // A tip that meets the axis along it.
+    (
+        "spike",
+        "[profiles.spike]
+boundary = 'to-axis'
+[[profiles.spike.curves]]
+kind = 'polyline'
+points = [[0, 0], [1, 0], [1, 1]]
+[[profiles.spike.curves]]
+kind = 'bezier'
+points = [[1, 1], [1, 2], [0, 3], [0, 4]]
+[[solid]]
+kind = 'revolve'
+profile = 'spike'
+",
+    ),
+    // The same as a hollow, downwards.
+    (
+        "pit",
+        "[profiles.pit]
+boundary = 'to-axis'
+[[profiles.pit.curves]]
+kind = 'bezier'
+points = [[0, 0.5], [0, 1.5], [1, 2], [1, 3]]
+[[profiles.pit.curves]]
+kind = 'polyline'
+points = [[1, 3], [1.5, 3], [1.5, 0], [0, 0]]
+[[solid]]
+kind = 'revolve'
+profile = 'pit'
+",
+    ),
     // Solids of one axis that are combined in the half-plane.
     (
         "hub",
@@ -95,6 +127,9 @@ fn grids(scene: &Scene) -> Vec<GridSpec> {
         around([64, 62, 31], centre, DVec3::new(1.2, 1.17, 1.2) * side),
         around([61, 53, 29], centre + off, DVec3::new(1.4, 1.0, 1.3) * side),
         around([5, 7, 3], centre, DVec3::splat(1.2 * side)),
+        // Voxels long in x, and very long.
+        around([23, 67, 31], centre, DVec3::new(1.3, 0.7, 0.2) * side),
+        around([11, 61, 29], centre + off, DVec3::new(1.5, 0.2, 0.1) * side),
         around(
             [31, 11, 17],
             centre + 3.0 * off,

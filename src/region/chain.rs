@@ -36,6 +36,8 @@ const AXIS: u32 = u32::MAX - 1;
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
     features: Vec<Feature>,
+    /// How far an arc may be from what it stands for.
+    tolerance: f64,
 }
 
 /// A signed distance with its derivatives.
@@ -69,10 +71,10 @@ impl Chain {
                 return None;
             }
         }
-        Some(Self::linked(&all, mirrored))
+        Some(Self::linked(&all, tolerance, mirrored))
     }
 
-    fn linked(all: &[Arc], mirrored: bool) -> Self {
+    fn linked(all: &[Arc], tolerance: f64, mirrored: bool) -> Self {
         let key = |p: [f64; 2]| p.map(|c| (c + 0.0).to_bits());
         // The arcs that start and that end at a point.
         let mut meeting: HashMap<[u64; 2], [Vec<u32>; 2]> = HashMap::new();
@@ -88,9 +90,9 @@ impl Chain {
                 after: OPEN,
             })
             .collect();
+        // `turn` is positive where the boundary turns left: the corner is nearest to points outside.
         let add_corner =
-            |features: &mut Vec<Feature>, at: [f64; 2], from: [f64; 2], to: [f64; 2]| {
-                let turn = cross(from, to);
+            |features: &mut Vec<Feature>, at: [f64; 2], from: [f64; 2], to: [f64; 2], turn: f64| {
                 let id = u32::try_from(features.len()).unwrap_or(OPEN);
                 features.push(Feature {
                     arc: Arc {
@@ -120,7 +122,7 @@ impl Chain {
                     // A cusp is left open.
                     continue;
                 }
-                let corner = add_corner(&mut features, arc.end, from, to);
+                let corner = add_corner(&mut features, arc.end, from, to, turn);
                 features[corner as usize].before = i;
                 features[corner as usize].after = *next;
                 features[i as usize].after = corner;
@@ -130,7 +132,9 @@ impl Chain {
                 features[i as usize].after = if arc.to[1].abs() <= SMOOTH {
                     AXIS
                 } else {
-                    let corner = add_corner(&mut features, arc.end, arc.to, mirror);
+                    // Twice the product of a positive r and z; the r may be 0, and the sign is still that of z.
+                    let turn = arc.to[1];
+                    let corner = add_corner(&mut features, arc.end, arc.to, mirror, turn);
                     features[corner as usize].before = i;
                     corner
                 };
@@ -143,7 +147,8 @@ impl Chain {
                 features[i as usize].before = if arc.from[1].abs() <= SMOOTH {
                     AXIS
                 } else {
-                    let corner = add_corner(&mut features, arc.start, mirror, arc.from);
+                    let turn = arc.from[1];
+                    let corner = add_corner(&mut features, arc.start, mirror, arc.from, turn);
                     features[corner as usize].after = i;
                     corner
                 };
@@ -151,7 +156,13 @@ impl Chain {
         }
         Self {
             features: in_order(&features),
+            tolerance,
         }
+    }
+
+    /// What the difference of two distances may err by.
+    pub(crate) fn margin(&self) -> f64 {
+        2.0 * self.tolerance
     }
 
     /// Number of features.

@@ -105,7 +105,8 @@ impl RadialTable {
             };
             let first = nearest(&near);
             // The differences to the others are linear but for the bends, where no other surface is crossed: they
-            // keep their sign where they have it at both ends by more than those.
+            // keep their sign where they have it at both ends by more than those. What the arcs err by is added:
+            // the sign of the distance is that of the surface that is nearer, not of its arc.
             let q = [node(k + 1), z];
             let bend = |i: usize| {
                 let passage = Passage::new(field, [&near[i], &far[i]], q);
@@ -117,7 +118,7 @@ impl RadialTable {
                 let bent = h * (bend(i) + own);
                 near[i].local.value * far[i].local.value > 0.0
                     && bent <= BENT
-                    && gap(&near).min(gap(&far)) > 0.25 * h * bent
+                    && gap(&near).min(gap(&far)) > 0.25 * h * bent + field.chain().margin()
             });
             let (a, b) = (&near[first], &far[first]);
             let good = clear && error(field, [a, b], q) <= tolerance;

@@ -2,7 +2,7 @@
 
 use super::bits;
 use super::fraction::FractionSampler;
-use super::memory::copy_past_caches;
+use super::memory::expand_past_caches;
 use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
 use super::tally::{Certainty, Tally};
 use super::upright::{UprightBody, UprightScratch};
@@ -109,7 +109,6 @@ impl std::fmt::Debug for LayerSampler<'_> {
 pub(super) struct LayerScratch {
     /// A bit for each voxel that is inside.
     inside: Vec<u64>,
-    bytes: Vec<u8>,
     upright: UprightScratch,
     radial: RadialScratch,
 }
@@ -403,16 +402,8 @@ impl<'a> LayerSampler<'a> {
 
     /// Fills one layer of occupancy in a large buffer.
     pub(super) fn occupancy_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u8]) {
-        /// Voxels expanded together: much more than a line, much less than a cache.
-        const PART: usize = 1 << 15;
-        if !self.layer_bits(k, scratch) {
-            return;
-        }
-        scratch.bytes.resize(PART, 0);
-        for (words, out) in scratch.inside.chunks(PART / 64).zip(out.chunks_mut(PART)) {
-            let bytes = &mut scratch.bytes[..out.len()];
-            bits::expand(self.kernel, words, bytes);
-            copy_past_caches(self.kernel, bytes, out);
+        if self.layer_bits(k, scratch) {
+            expand_past_caches(self.kernel, &scratch.inside, out);
         }
     }
 

@@ -10,6 +10,7 @@
     reason = "streaming stores and page advice have no safe form"
 )]
 
+use super::bits;
 use crate::math::{Kernel, SimdLevel};
 
 /// Copies bytes with stores that go past the caches, where the kernel's lanes have such.
@@ -29,6 +30,59 @@ pub(crate) fn copy_past_caches(kernel: Kernel, from: &[u8], to: &mut [u8]) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = kernel;
     to.copy_from_slice(from);
+}
+
+/// Values in their order, in parts that stores like.
+pub(crate) trait Lines {
+    /// The next value.
+    fn value(&mut self) -> f32;
+
+    /// The next 16 values.
+    fn line(&mut self) -> [f32; 16];
+}
+
+/// Fills a buffer with values, with stores that go past the caches where the kernel's lanes have such.
+pub(crate) fn write_past_caches(kernel: Kernel, from: &mut impl Lines, to: &mut [f32]) {
+    #[cfg(target_arch = "x86_64")]
+    match kernel.level() {
+        // SAFETY: the level says that this machine has AVX-512F.
+        SimdLevel::Avx512 => return unsafe { x86::write_512(from, to) },
+        // SAFETY: the level says that this machine has AVX2, and so AVX.
+        SimdLevel::Avx2 => return unsafe { x86::write_256(from, to) },
+        SimdLevel::Scalar | SimdLevel::Auto => {}
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = kernel;
+    write(from, to);
+}
+
+/// Fills a buffer with values.
+pub(crate) fn write(from: &mut impl Lines, to: &mut [f32]) {
+    let (lines, rest) = to.as_chunks_mut::<16>();
+    for line in lines {
+        *line = from.line();
+    }
+    for value in rest {
+        *value = from.value();
+    }
+}
+
+/// Writes one byte, 0 or 1, for each bit, past the caches where the kernel's lanes have such stores.
+pub(crate) fn expand_past_caches(kernel: Kernel, words: &[u64], to: &mut [u8]) {
+    assert!(to.len() <= 64 * words.len(), "a bit for each byte");
+    #[cfg(target_arch = "x86_64")]
+    if kernel.level() == SimdLevel::Avx512 {
+        // SAFETY: the level says that this machine has AVX-512F and AVX-512BW.
+        return unsafe { x86::expand_512(words, to) };
+    }
+    /// Bytes expanded together: some lines, and few enough to stay in the nearest cache.
+    const PART: usize = 1 << 14;
+    let mut bytes = [0; PART];
+    for (words, to) in words.chunks(PART / 64).zip(to.chunks_mut(PART)) {
+        let bytes = &mut bytes[..to.len()];
+        bits::expand(kernel, words, bytes);
+        copy_past_caches(kernel, bytes, to);
+    }
 }
 
 /// Asks for large pages under a buffer that has not been written yet. It is only advice: nothing depends on it.
@@ -63,9 +117,11 @@ pub(crate) fn advise_large_pages<T>(buffer: &mut [T]) {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
+    use super::super::bits;
     use std::arch::x86_64::{
-        __m256i, __m512i, _mm_sfence, _mm256_loadu_si256, _mm256_stream_si256, _mm512_loadu_si512,
-        _mm512_stream_si512,
+        __m256i, __m512i, _mm_sfence, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_stream_ps,
+        _mm256_stream_si256, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_maskz_set1_epi8,
+        _mm512_stream_ps, _mm512_stream_si512,
     };
 
     /// The part of `to` that is aligned for stores of `N` bytes, with the rest before and after it.
@@ -93,6 +149,89 @@ mod x86 {
             }
         }
         // Whoever is told that the buffer is filled sees it so.
+        _mm_sfence();
+    }
+
+    /// The values before the first aligned line, and the lines; the rest follows them.
+    fn split(to: &mut [f32]) -> (&mut [f32], &mut [[f32; 16]], &mut [f32]) {
+        let head = to.as_ptr().align_offset(64).min(to.len());
+        let (head, to) = to.split_at_mut(head);
+        let (lines, tail) = to.as_chunks_mut::<16>();
+        (head, lines, tail)
+    }
+
+    /// # Safety
+    /// The machine must have AVX-512F.
+    #[target_feature(enable = "avx512f")]
+    pub(super) unsafe fn write_512(from: &mut impl super::Lines, to: &mut [f32]) {
+        let (head, lines, tail) = split(to);
+        for value in head {
+            *value = from.value();
+        }
+        for line in lines {
+            let values = from.line();
+            // SAFETY: both are 64 bytes long, and `line` is aligned to 64 bytes: the lines start so.
+            unsafe {
+                _mm512_stream_ps(line.as_mut_ptr(), _mm512_loadu_ps(values.as_ptr()));
+            }
+        }
+        for value in tail {
+            *value = from.value();
+        }
+        _mm_sfence();
+    }
+
+    /// # Safety
+    /// The machine must have AVX.
+    #[target_feature(enable = "avx")]
+    pub(super) unsafe fn write_256(from: &mut impl super::Lines, to: &mut [f32]) {
+        let (head, lines, tail) = split(to);
+        for value in head {
+            *value = from.value();
+        }
+        for line in lines {
+            let values = from.line();
+            // SAFETY: halves of 32 bytes each, those of `line` aligned to 32 bytes as above.
+            unsafe {
+                let (a, b) = (values.as_ptr(), line.as_mut_ptr());
+                _mm256_stream_ps(b, _mm256_loadu_ps(a));
+                _mm256_stream_ps(b.add(8), _mm256_loadu_ps(a.add(8)));
+            }
+        }
+        for value in tail {
+            *value = from.value();
+        }
+        _mm_sfence();
+    }
+
+    /// The 64 bits from bit `at` on; those beyond the last word are 0.
+    #[inline(always)]
+    fn bits_from(words: &[u64], at: usize) -> u64 {
+        let (word, shift) = (at / 64, at % 64);
+        let low = words[word] >> shift;
+        match words.get(word + 1) {
+            Some(next) if shift != 0 => low | next << (64 - shift),
+            _ => low,
+        }
+    }
+
+    /// # Safety
+    /// The machine must have AVX-512F and AVX-512BW.
+    #[target_feature(enable = "avx512f,avx512bw")]
+    pub(super) unsafe fn expand_512(words: &[u64], to: &mut [u8]) {
+        let [head, tail] = aligned::<64>(to);
+        let plain = |to: &mut [u8], from: usize, until: usize| {
+            for (at, byte) in (from..until).zip(&mut to[from..until]) {
+                *byte = u8::from(bits::get(words, at));
+            }
+        };
+        plain(to, 0, head);
+        plain(to, tail, to.len());
+        for (n, b) in to[head..tail].chunks_exact_mut(64).enumerate() {
+            let ones = _mm512_maskz_set1_epi8(bits_from(words, head + 64 * n), 1);
+            // SAFETY: `b` is 64 bytes long and aligned to as many: the slice starts so, and so does every chunk.
+            unsafe { _mm512_stream_si512(b.as_mut_ptr().cast::<__m512i>(), ones) };
+        }
         _mm_sfence();
     }
 
@@ -132,6 +271,53 @@ mod tests {
                     copy_past_caches(kernel, &from[3..3 + length], &mut to[start..start + length]);
                     let mut twin = vec![7_u8; 900];
                     twin[start..start + length].copy_from_slice(&from[3..3 + length]);
+                    assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());
+                }
+            }
+        }
+    }
+
+    /// Counts.
+    struct Count(u16);
+
+    impl Lines for Count {
+        fn value(&mut self) -> f32 {
+            self.0 += 1;
+            f32::from(self.0)
+        }
+
+        fn line(&mut self) -> [f32; 16] {
+            std::array::from_fn(|_| self.value())
+        }
+    }
+
+    #[test]
+    fn streamed_values_are_those_written() {
+        for kernel in every_kernel() {
+            for start in [0, 1, 7, 15, 16, 17] {
+                for length in [0, 1, 15, 16, 50, 200] {
+                    let mut to = vec![7.0_f32; 300];
+                    write_past_caches(kernel, &mut Count(3), &mut to[start..start + length]);
+                    let mut twin = vec![7.0_f32; 300];
+                    write(&mut Count(3), &mut twin[start..start + length]);
+                    assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn streamed_bits_are_those_expanded() {
+        let words: Vec<u64> = (1..20_u64)
+            .map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+            .collect();
+        for kernel in every_kernel() {
+            for start in [0, 1, 31, 63, 64] {
+                for length in [0, 1, 63, 64, 65, 200, 19 * 64] {
+                    let mut to = vec![7_u8; 1400];
+                    expand_past_caches(kernel, &words, &mut to[start..start + length]);
+                    let mut twin = vec![7_u8; 1400];
+                    bits::expand(kernel, &words, &mut twin[start..start + length]);
                     assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());
                 }
             }

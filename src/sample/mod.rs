@@ -19,6 +19,7 @@ mod divided;
 mod fraction;
 mod layer;
 mod memory;
+mod mirror;
 mod plane;
 mod radial;
 mod spread;

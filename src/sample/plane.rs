@@ -6,6 +6,7 @@
 use crate::grid::GridSpec;
 use crate::math::{Dd, Real};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Voxels for which one cell number is kept: lanes of that many read cells from it on.
 pub(super) const BLOCK: usize = 8;
@@ -25,8 +26,10 @@ pub(super) struct Plane {
     radii: Vec<u32>,
     /// The least cell of each block of a row.
     blocks: Vec<u32>,
-    /// Rows, each with the one that mirrors it.
-    rows: Vec<(usize, Option<usize>)>,
+    /// Rows that are kept: the first of them all, in their order.
+    rows: usize,
+    /// Rows of a layer.
+    layer_rows: usize,
     /// Voxels of a row that are kept.
     stored: usize,
     /// The same, filled up to whole lanes.
@@ -35,9 +38,9 @@ pub(super) struct Plane {
     columns: usize,
 }
 
-/// One row of radii.
+/// Radii in whole blocks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PlaneRow<'a> {
+pub(super) struct Radii<'a> {
     pub(super) radii: &'a [u32],
     pub(super) blocks: &'a [u32],
 }
@@ -64,27 +67,18 @@ impl Plane {
         }
         let alike = |v: &[f64]| (v.iter().zip(v.iter().rev())).all(|(a, b)| (a + b).abs() <= ALIKE);
         let stored = if alike(&x) { nx.div_ceil(2) } else { nx };
-        let rows: Vec<(usize, Option<usize>)> = if alike(&y) {
-            let twin = |j: usize| (2 * j + 1 < ny).then(|| ny - 1 - j);
-            (0..ny.div_ceil(2)).map(|j| (j, twin(j))).collect()
-        } else {
-            (0..ny).map(|j| (j, None)).collect()
-        };
+        let rows = if alike(&y) { ny.div_ceil(2) } else { ny };
         let padded = stored.next_multiple_of(LANES);
-        if rows
-            .len()
-            .checked_mul(padded)
-            .is_none_or(|n| n > MOST_RADII)
-        {
+        if rows.checked_mul(padded).is_none_or(|n| n > MOST_RADII) {
             return None;
         }
         let width = padded / BLOCK;
-        let mut radii = vec![0; rows.len() * padded];
-        let mut blocks = vec![0; rows.len() * width];
+        let mut radii = vec![0; rows * padded];
+        let mut blocks = vec![0; rows * width];
         let lines = radii
             .par_chunks_mut(padded)
             .zip(blocks.par_chunks_mut(width));
-        lines.zip(&rows).for_each(|((radii, blocks), &(j, _))| {
+        lines.zip(&y).for_each(|((radii, blocks), y)| {
             for (radius, x) in radii.iter_mut().zip(&x) {
                 #[allow(
                     clippy::cast_possible_truncation,
@@ -92,7 +86,7 @@ impl Plane {
                     reason = "checked against the largest radius"
                 )]
                 {
-                    *radius = ((x * x + y[j] * y[j]).sqrt() * PLACES + 0.5) as u32;
+                    *radius = ((x * x + y * y).sqrt() * PLACES + 0.5) as u32;
                 }
             }
             let last = radii[stored - 1];
@@ -112,24 +106,25 @@ impl Plane {
             radii,
             blocks,
             rows,
+            layer_rows: ny,
             stored,
             padded,
             columns: nx,
         })
     }
 
-    /// The rows to be computed: number, the one that mirrors it, and the radii of the stored part.
-    pub(super) fn rows(
-        &self,
-    ) -> impl ExactSizeIterator<Item = (usize, Option<usize>, PlaneRow<'_>)> {
+    /// Number of the rows to be computed.
+    pub(super) fn len(&self) -> usize {
+        self.rows
+    }
+
+    /// The radii of rows that follow each other, padding included.
+    pub(super) fn radii(&self, rows: Range<usize>) -> Radii<'_> {
         let (padded, width) = (self.padded, self.padded / BLOCK);
-        (self.rows.iter().enumerate()).map(move |(n, &(j, twin))| {
-            let row = PlaneRow {
-                radii: &self.radii[n * padded..(n + 1) * padded],
-                blocks: &self.blocks[n * width..(n + 1) * width],
-            };
-            (j, twin, row)
-        })
+        Radii {
+            radii: &self.radii[rows.start * padded..rows.end * padded],
+            blocks: &self.blocks[rows.start * width..rows.end * width],
+        }
     }
 
     /// The largest radius, in cells.
@@ -137,28 +132,10 @@ impl Plane {
         self.radii.iter().max().map_or(0, |r| (r >> 16) + 1)
     }
 
-    /// Completes a row whose stored part is filled.
-    pub(super) fn mirror<T: Copy>(&self, row: &mut [T]) {
-        // In parts of fixed length, which the compiler reverses in registers.
-        let (left, right) = row.split_at_mut(self.stored);
-        let (left, from) = left[..right.len()].as_chunks::<16>();
-        let (to, right) = right.as_rchunks_mut::<16>();
-        for (b, a) in right.iter_mut().rev().zip(left) {
-            *b = std::array::from_fn(|n| a[15 - n]);
-        }
-        for (b, a) in to.iter_mut().rev().zip(from) {
-            *b = *a;
-        }
-    }
-
-    /// Whether rows mirror each other.
-    pub(super) fn has_twins(&self) -> bool {
-        self.rows[0].1.is_some()
-    }
-
     /// The row that mirrors row `j`.
     pub(super) fn twin(&self, j: usize) -> Option<usize> {
-        self.rows[j].1
+        let twin = self.layer_rows - 1 - j;
+        (self.rows < self.layer_rows && twin != j).then_some(twin)
     }
 
     /// The voxel that mirrors voxel `i` of a row's stored part.

@@ -6,7 +6,7 @@
 //! so near that the sign is in question.
 //!
 //! ```text
-//!   |stored - exact| <= arcs 2.5e-5 + cubics 3.5e-5 + radii 0.8e-5 + sums 0.2e-5 of the least spacing + 1/2 ulp
+//!   |stored - exact| <= arcs 2.5e-5 + cubics 3.5e-5 + radii 1.0e-5 + sums 0.3e-5 of the least spacing + 1/2 ulp
 //! ```
 //!
 //! The shares are bounds, proved in [`crate::region`] and [`super::plane`]; the sum stays within
@@ -14,23 +14,27 @@
 
 use super::bits;
 use super::layer::stored;
-use super::memory::copy_past_caches;
-use super::plane::{BLOCK, Plane, PlaneRow};
+use super::memory::{self, write_past_caches};
+use super::mirror::{MirroredRows, Parts};
+use super::plane::{BLOCK, Plane};
 use super::spread::spread;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real};
 use crate::region::{Chain, Extent, MeridianField, RadialTable};
 use crate::solid::{Revolved, Turn, signed};
+use std::ops::Range;
 
 /// Shares of the least spacing.
 const ARCS: f64 = 2.5e-5;
 const CUBICS: f64 = 3.5e-5;
 /// Nearer to the surface than this the exact path answers.
 const NEAR: f64 = 2e-4;
+/// Widest cell of a table, in least spacings.
+const WIDEST: f64 = 1.25;
 /// The most arcs a boundary is replaced by.
 const MOST_ARCS: usize = 20_000;
 /// Bytes written together past the caches: much more than a line, much less than a cache.
-const TOGETHER: usize = 1 << 16;
+const TOGETHER: usize = 1 << 14;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 
@@ -49,13 +53,11 @@ pub(super) struct RadialSampler {
 #[derive(Debug, Default)]
 pub(super) struct RadialScratch {
     table: RadialTable,
-    row: Vec<f32>,
+    /// The stored parts of some rows.
+    parts: Vec<f32>,
     doubts: Vec<u8>,
     /// Voxels of the layer whose sign the exact path tells.
     close: Vec<[usize; 2]>,
-    /// Rows that wait to be written together: upwards from a row, and downwards to the row that mirrors it.
-    ahead: Vec<f32>,
-    behind: Vec<f32>,
 }
 
 /// A layer whose membership is known.
@@ -91,7 +93,9 @@ impl RadialSampler {
             return None;
         }
         let axis = frame.origin_exact();
-        let plane = Plane::new(grid, [axis[0], axis[1]], spacing.x)?;
+        // Radii are rounded to a part of a cell, whatever the voxels are long.
+        let parts = (spacing.x / (WIDEST * spacing.min_element())).ceil();
+        let plane = Plane::new(grid, [axis[0], axis[1]], spacing.x / parts)?;
         let swept: Vec<_> = (body.boundary().iter())
             .filter(|b| !b.piece.on_axis)
             .cloned()
@@ -99,7 +103,7 @@ impl RadialSampler {
         let chain = Chain::new(&swept, ARCS * least, MOST_ARCS, true)?;
         let height = |k: usize| frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
         let (a, b) = (height(0), height(grid.dims()[2] - 1));
-        let cell = (Dd::of(spacing.x) / frame.scale_exact()).f64();
+        let cell = (Dd::of(spacing.x / parts) / frame.scale_exact()).f64();
         let extent = Extent {
             r: [0.0, f64::from(plane.reach()) * cell],
             z: [a.min(b), a.max(b)],
@@ -125,13 +129,9 @@ impl RadialSampler {
         scratch: &mut RadialScratch,
         out: &mut [f32],
     ) {
-        let Writing {
-            kernel,
-            band,
-            past_caches,
-        } = writing;
+        let Writing { kernel, band, .. } = writing;
         let KnownLayer { k, inside } = known;
-        let [nx, ny, _] = grid.dims();
+        let nx = grid.dims()[0];
         let frame = body.frame();
         let z = frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
         scratch
@@ -139,53 +139,39 @@ impl RadialSampler {
             .fill(&self.field, z, frame.scale(), self.tolerance);
         scratch.close.clear();
         let (columns, padded) = self.plane.stored();
-        scratch.row.resize(nx.max(padded), 0.0);
-        scratch.doubts.resize(padded / BLOCK, 0);
-        // Rows wait for each other only where they are written past the caches.
-        let together = (TOGETHER / (4 * nx)).max(1);
-        scratch.ahead.resize(together * nx, 0.0);
-        scratch.behind.resize(together * nx, 0.0);
-        let (mut first, mut waiting) = (0, 0);
-        for (j, twin, radii) in self.plane.rows() {
-            self.row(kernel, [j, nx], radii, inside, scratch);
-            let row = &mut scratch.row;
-            if band.is_finite() {
-                clamp(&mut row[..columns], stored(band));
-            }
-            self.plane.mirror(&mut row[..nx]);
-            let row = &row[..nx];
-            if !past_caches {
-                for j in std::iter::once(j).chain(twin) {
-                    out[j * nx..(j + 1) * nx].copy_from_slice(row);
+        let rows = self.plane.len();
+        let mut first = 0;
+        while first < rows {
+            let next = (first + (TOGETHER / (4 * nx)).max(1)).min(rows);
+            let parts = (next - first) * padded;
+            scratch.parts.resize(parts, 0.0);
+            scratch.doubts.resize(parts / BLOCK, 0);
+            spread(
+                kernel,
+                self.plane.radii(first..next),
+                scratch.table.coefficients.each_ref().map(Vec::as_slice),
+                self.near,
+                &mut scratch.parts,
+                &mut scratch.doubts,
+            );
+            for j in first..next {
+                let at = j - first;
+                let blocks = padded / BLOCK;
+                let marks = &scratch.doubts[at * blocks..(at + 1) * blocks];
+                let part = &mut scratch.parts[at * padded..at * padded + columns];
+                let mend = Mend {
+                    table: &scratch.table,
+                    inside,
+                    row: [j, nx],
+                    close: &mut scratch.close,
+                };
+                self.mend(mend, marks, part);
+                if band.is_finite() {
+                    clamp(part, stored(band));
                 }
-                continue;
             }
-            scratch.ahead[waiting * nx..(waiting + 1) * nx].copy_from_slice(row);
-            if twin.is_some() {
-                let at = (together - 1 - waiting) * nx;
-                scratch.behind[at..at + nx].copy_from_slice(row);
-            }
-            waiting += 1;
-            // A row without a twin among rows with twins is the last, in the middle.
-            let last = j + 1 == self.plane.rows().len();
-            if waiting < together && !last {
-                continue;
-            }
-            let mut put = |from: &[f32], row: usize| {
-                let to = &mut out[row * nx..row * nx + from.len()];
-                copy_past_caches(
-                    kernel,
-                    bytemuck::cast_slice(from),
-                    bytemuck::cast_slice_mut(to),
-                );
-            };
-            put(&scratch.ahead[..waiting * nx], first);
-            if self.plane.has_twins() {
-                let pairs = if twin.is_some() { waiting } else { waiting - 1 };
-                let from = (together - pairs) * nx;
-                put(&scratch.behind[from..], ny - first - pairs);
-            }
-            (first, waiting) = (j + 1, 0);
+            self.write(first..next, nx, writing, &scratch.parts, out);
+            first = next;
         }
         for &[i, j] in &scratch.close {
             for j in std::iter::once(j).chain(self.plane.twin(j)) {
@@ -198,49 +184,80 @@ impl RadialSampler {
         }
     }
 
-    /// Fills the kept part of the scratch's row with that of row `j` of `nx` voxels.
-    fn row(
+    /// Writes the rows whose parts are computed, and those that mirror them.
+    fn write(
         &self,
-        kernel: Kernel,
-        [j, nx]: [usize; 2],
-        radii: PlaneRow<'_>,
-        inside: &[u64],
-        scratch: &mut RadialScratch,
+        rows: Range<usize>,
+        nx: usize,
+        writing: Writing,
+        values: &[f32],
+        out: &mut [f32],
     ) {
-        let (columns, padded) = self.plane.stored();
-        let (table, row) = (&scratch.table, &mut scratch.row);
-        let coefficients = table.coefficients.each_ref().map(Vec::as_slice);
-        let doubts = &mut scratch.doubts;
-        spread(
-            kernel,
-            radii,
-            coefficients,
-            self.near,
-            &mut row[..padded],
-            doubts,
+        let (stored, padded) = self.plane.stored();
+        let parts = Parts {
+            values,
+            padded,
+            stored,
+            columns: nx,
+        };
+        let put = |part: Range<usize>, descending: bool, row: usize, out: &mut [f32]| {
+            let to = &mut out[row * nx..(row + part.len()) * nx];
+            let mut from = MirroredRows::new(parts, part, descending);
+            if writing.past_caches {
+                write_past_caches(writing.kernel, &mut from, to);
+            } else {
+                memory::write(&mut from, to);
+            }
+        };
+        put(0..rows.len(), false, rows.start, out);
+        // A row without a twin among rows that have one is the last, in the middle.
+        let pairs = (rows.clone()).take_while(|j| self.plane.twin(*j).is_some());
+        if let Some(last) = pairs.last()
+            && let Some(twin) = self.plane.twin(last)
+        {
+            put(0..last + 1 - rows.start, true, twin, out);
+        }
+    }
+
+    /// Fills in what the table left open of a row's stored part.
+    fn mend(&self, at: Mend<'_>, marks: &[u8], part: &mut [f32]) {
+        let [j, nx] = at.row;
+        let (words, rest) = marks.as_chunks::<8>();
+        let last = (
+            words.len(),
+            rest.iter().rev().fold(0, |w, b| w << 8 | u64::from(*b)),
         );
-        let per_place = self.field.cell() / super::plane::PLACES;
-        for (block, &marks) in doubts.iter().enumerate().filter(|(_, m)| **m != 0) {
-            let mut marks = marks;
-            while marks != 0 {
-                let i = block * BLOCK + marks.trailing_zeros() as usize;
-                marks &= marks - 1;
-                if i >= columns {
+        let words = words.iter().map(|b| u64::from_le_bytes(*b)).enumerate();
+        for (n, mut word) in words.chain([last]).filter(|(_, w)| *w != 0) {
+            while word != 0 {
+                let i = 64 * n + word.trailing_zeros() as usize;
+                word &= word - 1;
+                if i >= part.len() {
                     break;
                 }
-                let radius = radii.radii[i];
-                if row[i].is_nan() {
-                    let r = f64::from(radius) * per_place;
-                    let distance = table.mended(&self.field, (radius >> 16) as usize, r);
-                    let side = bits::get(inside, j * nx + i);
-                    row[i] = stored(signed(distance, side));
+                if part[i].is_nan() {
+                    let radius = self.plane.radii(j..j + 1).radii[i];
+                    let r = f64::from(radius) * self.field.cell() / super::plane::PLACES;
+                    let distance = (at.table).mended(&self.field, (radius >> 16) as usize, r);
+                    let side = bits::get(at.inside, j * nx + i);
+                    part[i] = stored(signed(distance, side));
                 }
-                if !(row[i].abs() >= self.near) {
-                    scratch.close.push([i, j]);
+                if !(part[i].abs() >= self.near) {
+                    at.close.push([i, j]);
                 }
             }
         }
     }
+}
+
+/// What a row is mended from.
+struct Mend<'a> {
+    table: &'a RadialTable,
+    /// A bit for each voxel of the layer that is inside.
+    inside: &'a [u64],
+    /// The row, and how many voxels it has.
+    row: [usize; 2],
+    close: &'a mut Vec<[usize; 2]>,
 }
 
 /// Clamps values to ± `band`.

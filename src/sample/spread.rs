@@ -1,4 +1,4 @@
-//! A table of cubics, spread to the voxels of a row.
+//! A table of cubics, spread to the voxels of rows.
 //!
 //! ```text
 //!   value = c0 + (c4 + t (c1 + t (c2 + t c3)))      cell and t from the voxel's radius
@@ -13,7 +13,7 @@
 //! * Accuracy: half an ulp of the value, and some ulps of a cell's side.
 //! * The plain loop is the definition; the wide ones agree with it bit for bit.
 
-use super::plane::{BLOCK, PlaneRow, SCATTERED};
+use super::plane::{BLOCK, Radii, SCATTERED};
 use crate::math::Kernel;
 #[cfg(target_arch = "x86_64")]
 use pulp::Arch;
@@ -21,14 +21,14 @@ use pulp::Arch;
 /// Fills `out`, and sets in `doubts` a bit, eight to a byte, for each value that is NaN or nearer to 0 than `least`.
 pub(super) fn spread(
     kernel: Kernel,
-    row: PlaneRow<'_>,
+    at: Radii<'_>,
     table: [&[f32]; 5],
     least: f32,
     out: &mut [f32],
     doubts: &mut [u8],
 ) {
     let job = Spread {
-        row,
+        at,
         table,
         least,
         out,
@@ -44,7 +44,7 @@ pub(super) fn spread(
 }
 
 struct Spread<'a> {
-    row: PlaneRow<'a>,
+    at: Radii<'a>,
     table: [&'a [f32]; 5],
     least: f32,
     out: &'a mut [f32],
@@ -55,7 +55,7 @@ impl Spread<'_> {
     /// The definition, from a block on.
     #[inline(always)]
     fn run(self, first: usize) {
-        let radii = self.row.radii.chunks(BLOCK).skip(first);
+        let radii = self.at.radii.chunks(BLOCK).skip(first);
         let out = self.out.chunks_mut(BLOCK).skip(first);
         for ((radii, out), doubts) in radii.zip(out).zip(&mut self.doubts[first..]) {
             *doubts = plain(&self.table, self.least, radii, out);
@@ -117,15 +117,15 @@ impl pulp::NullaryFnOnce for Wide512<'_> {
         let Self(simd, job) = self;
         let f = simd.avx512f;
         let Spread {
-            row,
+            at,
             table,
             least,
             out,
             doubts,
         } = job;
-        let (radii, rest) = row.radii.as_chunks::<16>();
+        let (radii, rest) = at.radii.as_chunks::<16>();
         let (values, _) = out.as_chunks_mut::<16>();
-        let (blocks, _) = row.blocks.as_chunks::<2>();
+        let (blocks, _) = at.blocks.as_chunks::<2>();
         let (marks, _) = doubts.as_chunks_mut::<2>();
         let part = f._mm512_set1_ps(1.0 / 65_536.0);
         let low = f._mm512_set1_epi32(0xffff);
@@ -167,7 +167,7 @@ impl pulp::NullaryFnOnce for Wide512<'_> {
         let done = radii.len() * 2;
         if !rest.is_empty() {
             Spread {
-                row,
+                at,
                 table,
                 least,
                 out,
@@ -208,13 +208,13 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
         let Self(simd, job) = self;
         let (f, i) = (simd.avx, simd.avx2);
         let Spread {
-            row,
+            at,
             table,
             least,
             out,
             doubts,
         } = job;
-        let (radii, rest) = row.radii.as_chunks::<BLOCK>();
+        let (radii, rest) = at.radii.as_chunks::<BLOCK>();
         let (values, _) = out.as_chunks_mut::<BLOCK>();
         let part = f._mm256_set1_ps(1.0 / 65_536.0);
         let low = f._mm256_set1_epi32(0xffff);
@@ -222,7 +222,7 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
         let sign = f._mm256_set1_ps(-0.0);
         for n in 0..radii.len() {
             let (radii, values) = (&radii[n], &mut values[n]);
-            let first = row.blocks[n];
+            let first = at.blocks[n];
             let (Some(a), Some(b), Some(c), Some(d), Some(e), true) = (
                 window::<16>(table[0], first),
                 window::<16>(table[1], first),
@@ -264,7 +264,7 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
         let done = radii.len();
         if !rest.is_empty() {
             Spread {
-                row,
+                at,
                 table,
                 least,
                 out,

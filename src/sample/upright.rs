@@ -4,11 +4,13 @@
 //! voxels of a row within a radius are those between two ends, found for all rows at once:
 //!
 //! ```text
-//!   |i - c| <= sqrt(R² - y²) / h      i the voxel's number in the row, c that of the axis, h the spacing
+//!   |i - c| <= m,   m = sqrt(D) / h,   D = R² - y²      i the voxel's number, c the axis's, h the spacing
 //! ```
 //!
-//! once with R² - y² less its rounding and once with it more. Voxels that only the second has, hardly ever any, are
-//! asked one by one. A wedge is the same in all layers and is kept as bits.
+//! D is known up to its rounding w, and m up to `w / h²` where it is at least a voxel, since
+//! `sqrt(D) - sqrt(D - w) <= w / sqrt(D)`. A voxel that the bounds leave open, hardly ever any, is asked alone, and
+//! so are the few of a row that the circle only touches. A row and the one that mirrors it have the same ends. A
+//! wedge is the same in all layers and is kept as bits.
 
 use super::bits;
 use crate::grid::GridSpec;
@@ -18,8 +20,11 @@ use crate::solid::{Cuts, LayerCuts, Revolved, Ring, Row, Turn};
 /// Rows of a grid as one upright body sees them.
 #[derive(Debug)]
 pub(super) struct UprightBody {
-    /// Squared distance of each row from the axis, in the region's unit.
+    /// Squared distance from the axis, in voxels, of each row up to the one in the middle, or of all where the axis
+    /// is not in their middle.
     squares: Vec<f64>,
+    /// How much a row and the one that mirrors it differ, in voxels.
+    asymmetry: f64,
     /// Place of the axis in a row, in voxels.
     centre: f64,
     /// Voxels for a unit of length.
@@ -27,18 +32,23 @@ pub(super) struct UprightBody {
     /// Rounding of a place in a row, in voxels.
     slack: f64,
     columns: usize,
+    rows: usize,
     wedge: Option<Vec<u64>>,
 }
 
 /// What one thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct UprightScratch {
-    /// For each row: from and to, surely; and from and to, perhaps.
-    ends: [Vec<i32>; 4],
+    /// For each row its first voxel and the one after its last.
+    ends: [Vec<i32>; 2],
+    /// For each row whether other ends are possible.
+    open: Vec<i32>,
 }
 
-/// Rounding of a squared half chord, relative to its terms.
-const SQUARE_ROUNDING: f64 = 64.0 * f64::EPSILON;
+/// Rounding of a squared radius or row, relative to the radius's.
+const SQUARE_ROUNDING: f64 = 128.0 * f64::EPSILON;
+/// Asymmetry of the rows that is left to the brackets, in voxels.
+const ALIKE: f64 = 1e-9;
 
 impl UprightBody {
     /// The rows of `grid`; `None` where the body's axis is not parallel to grid z or the numbers leave no room.
@@ -48,12 +58,16 @@ impl UprightBody {
         }
         let [nx, ny, _] = grid.dims();
         let frame = body.frame();
-        let scale = frame.scale();
         let axis = frame.origin_exact();
-        let away = |c: usize, index: usize| (Dd::of(grid.centre_along(c, index)) - axis[c]).f64();
-        let squares = (0..ny).map(|j| (away(1, j) / scale).powi(2)).collect();
         let step = grid.spacing().x;
-        let centre = -away(0, 0) / step;
+        let away =
+            |c: usize, index: usize| (Dd::of(grid.centre_along(c, index)) - axis[c]).f64() / step;
+        let rows: Vec<f64> = (0..ny).map(|j| away(1, j)).collect();
+        let pairs = rows.iter().zip(rows.iter().rev());
+        let asymmetry = pairs.fold(0.0_f64, |m, (a, b)| m.max((a + b).abs()));
+        let mirrored = asymmetry <= ALIKE;
+        let kept = if mirrored { ny.div_ceil(2) } else { ny };
+        let centre = -away(0, 0);
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
         let last = nx as f64;
         let far = grid
@@ -64,11 +78,13 @@ impl UprightBody {
         // Centres are rounded in the world, and the axis's place in the row once.
         let slack = 4.0 * f64::EPSILON * far / step + 16.0 * f64::EPSILON * (centre.abs() + last);
         (slack < 0.25 && nx < 1 << 30).then(|| Self {
-            squares,
+            squares: rows[..kept].iter().map(|y| y * y).collect(),
+            asymmetry: if mirrored { asymmetry } else { 0.0 },
             centre,
-            per_length: scale / step,
+            per_length: frame.scale() / step,
             slack,
             columns: nx,
+            rows: ny,
             wedge: match body.turn() {
                 Turn::Full => None,
                 Turn::Partial(_) => Some(wedge_bits(body, grid)),
@@ -95,21 +111,15 @@ impl UprightBody {
         for (n, ring) in rings.iter().enumerate() {
             let beyond = rings.get(n + 1).is_some_and(|r| r.side != Side::Outside);
             let changes = (ring.side != Side::Outside) != beyond;
-            self.ends(kernel, ring, &mut scratch.ends);
-            for j in 0..self.squares.len() {
-                let [surely, before, perhaps, until] = scratch.ends.each_ref().map(|e| e[j]);
-                let (first, at) = (j * self.columns, |i: i32| usize::try_from(i).unwrap_or(0));
-                if changes {
-                    bits::flip(words, first + at(surely), first + at(before));
-                }
-                if perhaps < surely || until > before {
-                    // The voxels at either end, or all of a row that only touches.
-                    let (left, right) = if surely < before {
-                        (surely, before)
-                    } else {
-                        (until, until)
-                    };
-                    doubtful.extend((perhaps..left).chain(right..until).map(|i| [at(i), j]));
+            let circle = self.circle(ring);
+            let any_open = self.ends(kernel, &circle, scratch);
+            if changes {
+                self.flip(scratch, words);
+            }
+            if any_open {
+                for (j, _) in scratch.open.iter().enumerate().filter(|(_, o)| **o != 0) {
+                    let ends = scratch.ends.each_ref().map(|e| e[j]);
+                    self.doubts(&circle, j, ends, &mut doubtful);
                 }
             }
         }
@@ -124,24 +134,71 @@ impl UprightBody {
         }
     }
 
-    /// For each row the voxels within the ring's radius.
-    fn ends(&self, kernel: Kernel, ring: &Ring, ends: &mut [Vec<i32>; 4]) {
-        for list in &mut *ends {
-            list.resize(self.squares.len(), 0);
+    /// The row that mirrors row `j` of those kept.
+    fn twin(&self, j: usize) -> Option<usize> {
+        let twin = self.rows - 1 - j;
+        (self.squares.len() < self.rows && twin != j).then_some(twin)
+    }
+
+    /// Flips the voxels between the ends.
+    fn flip(&self, scratch: &UprightScratch, words: &mut [u64]) {
+        let [from, to] = &scratch.ends;
+        for (j, (&from, &to)) in from.iter().zip(to).enumerate() {
+            if from >= to {
+                continue;
+            }
+            let [from, to] = [from, to].map(|i| usize::try_from(i).unwrap_or(0));
+            bits::flip(words, j * self.columns + from, j * self.columns + to);
+            if let Some(twin) = self.twin(j) {
+                bits::flip(words, twin * self.columns + from, twin * self.columns + to);
+            }
         }
-        let [low, high] = ring.radius;
-        let (square, width) = (high * high, (high - low.max(0.0)) * (2.0 * high));
+    }
+
+    /// The voxels of row `j` and its twin that the bounds leave open.
+    fn doubts(&self, circle: &Circle, j: usize, [from, to]: [i32; 2], out: &mut Vec<[usize; 2]>) {
+        let most = (circle.square - self.squares[j] + circle.rounding)
+            .max(0.0)
+            .sqrt();
+        let reach = most + circle.slack;
+        let first = place((self.centre - reach).ceil(), circle.last);
+        let last = place((self.centre + reach).floor() + 1.0, circle.last);
+        // The voxels at either end, or all of a row that only touches.
+        let (left, right) = if from < to { (from, to) } else { (last, last) };
+        for i in (first..left).chain(right..last) {
+            let i = usize::try_from(i).unwrap_or(0);
+            out.extend(std::iter::once(j).chain(self.twin(j)).map(|j| [i, j]));
+        }
+    }
+
+    /// A ring's outer circle in voxels.
+    fn circle(&self, ring: &Ring) -> Circle {
+        let [low, high] = ring.radius.map(|r| r.max(0.0) * self.per_length);
+        let square = high * high;
+        let rounding = 2.0 * SQUARE_ROUNDING * square
+            + 2.0 * high * (high - low)
+            + (2.0 * high + self.asymmetry) * self.asymmetry;
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^30")]
         let last = self.columns as f64;
+        Circle {
+            square,
+            rounding,
+            slack: self.slack + rounding,
+            centre: self.centre,
+            last,
+        }
+    }
+
+    /// For each row the voxels surely within the circle; whether any row has others that may be.
+    fn ends(&self, kernel: Kernel, circle: &Circle, scratch: &mut UprightScratch) -> bool {
+        for list in scratch.ends.iter_mut().chain([&mut scratch.open]) {
+            list.resize(self.squares.len(), 0);
+        }
         let job = Ends {
             squares: &self.squares,
-            ends: ends.each_mut().map(Vec::as_mut_slice),
-            square,
-            width,
-            centre: self.centre,
-            per_length: self.per_length,
-            slack: self.slack,
-            last,
+            ends: scratch.ends.each_mut().map(Vec::as_mut_slice),
+            open: &mut scratch.open,
+            circle,
         };
         match kernel.lanes() {
             Some(arch) => arch.dispatch(job),
@@ -150,58 +207,80 @@ impl UprightBody {
     }
 }
 
-/// One radius and all rows.
-struct Ends<'a> {
-    squares: &'a [f64],
-    ends: [&'a mut [i32]; 4],
+/// A circle around the axis, in voxels.
+#[derive(Debug, Clone, Copy)]
+struct Circle {
+    /// Squared radius.
     square: f64,
-    width: f64,
-    centre: f64,
-    per_length: f64,
+    /// What the square of a half chord may err by.
+    rounding: f64,
+    /// What the end of a chord longer than two voxels may err by.
     slack: f64,
+    /// Place of the axis in a row.
+    centre: f64,
+    /// Voxels of a row.
     last: f64,
 }
 
+/// One circle and all rows.
+struct Ends<'a> {
+    squares: &'a [f64],
+    ends: [&'a mut [i32]; 2],
+    open: &'a mut [i32],
+    circle: &'a Circle,
+}
+
 impl pulp::NullaryFnOnce for Ends<'_> {
-    type Output = ();
+    type Output = bool;
 
     #[inline(always)]
-    fn call(self) {
-        self.run();
+    fn call(self) -> bool {
+        self.run()
     }
 }
 
 impl Ends<'_> {
     /// Lists of one length each, so that the compiler uses its lanes.
     #[inline(always)]
-    fn run(self) {
-        let [a, b, c, d] = self.ends;
+    fn run(self) -> bool {
+        let Circle {
+            square,
+            rounding,
+            slack,
+            centre,
+            last,
+        } = *self.circle;
         let n = self.squares.len();
-        let (a, b, c, d) = (&mut a[..n], &mut b[..n], &mut c[..n], &mut d[..n]);
+        let [from, to] = self.ends;
+        let (from, to, open) = (&mut from[..n], &mut to[..n], &mut self.open[..n]);
+        let mut any = 0;
         for j in 0..n {
-            let y2 = self.squares[j];
-            let difference = self.square - y2;
-            let rounding = SQUARE_ROUNDING * (self.square + y2) + self.width;
-            let most = (difference + rounding).max(0.0).sqrt() * self.per_length;
-            let least = (difference - rounding).max(0.0).sqrt() * self.per_length;
-            // A row out of reach has no end at all.
-            let reach = if difference + rounding < 0.0 {
-                -1.0
-            } else {
-                self.slack
-            };
-            a[j] = place((self.centre - least + self.slack).ceil(), self.last);
-            b[j] = place((self.centre + least - self.slack).floor() + 1.0, self.last);
-            c[j] = place((self.centre - most - reach).ceil(), self.last);
-            d[j] = place((self.centre + most + reach).floor() + 1.0, self.last);
+            let difference = square - self.squares[j];
+            let half = difference.max(0.0).sqrt();
+            let a = place((centre - half + slack).ceil(), last);
+            let b = place((centre + half - slack).floor() + 1.0, last);
+            let c = place((centre - half - slack).ceil(), last);
+            let d = place((centre + half + slack).floor() + 1.0, last);
+            // A short chord is left open as a whole, a row out of reach has none.
+            let long = difference >= 1.0;
+            let reached = i32::from(difference + rounding >= 0.0);
+            from[j] = if long { a } else { 0 };
+            to[j] = if long { b } else { 0 };
+            open[j] = if long { (a - c) | (d - b) } else { reached };
+            any |= open[j];
         }
+        any != 0
     }
 }
 
 #[inline(always)]
-#[allow(clippy::cast_possible_truncation, reason = "clamped to the row")]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "clamped to the row; the low bits of 1.5 * 2^52 and a number are the number"
+)]
 fn place(v: f64, last: f64) -> i32 {
-    v.max(0.0).min(last) as i32
+    const LOW_BITS: f64 = 6_755_399_441_055_744.0;
+    (v.max(0.0).min(last) + LOW_BITS).to_bits() as i32
 }
 
 /// The voxels of any layer that a body's wedge holds.
