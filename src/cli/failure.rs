@@ -15,7 +15,7 @@ use std::process::ExitCode;
 pub(super) enum Failure {
     /// Bad usage, found after the arguments were read.
     Usage(String),
-    /// Standard output could not be written.
+    /// Standard output, or a file of the command's own, could not be written.
     Output(String),
     /// Answers that should be equal are not.
     Disagreement(String),
@@ -34,6 +34,10 @@ impl Failure {
 
     pub(super) fn output(error: &std::io::Error) -> Self {
         Self::Output(format!("cannot write to standard output: {error}"))
+    }
+
+    pub(super) fn files(text: impl Into<String>) -> Self {
+        Self::Output(text.into())
     }
 
     fn code(&self) -> u8 {
