@@ -35,6 +35,7 @@ struct Plan {
     channels: Vec<ChannelSpec>,
     compression: Compression,
     workers: usize,
+    memory_limit: u64,
     layer_bytes: u64,
     stack_bytes: u64,
 }
@@ -227,13 +228,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         }
         .into());
     }
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "not more than the number of threads"
-    )]
-    let workers = (limit / layer_bytes.max(1))
-        .min(rayon::current_num_threads() as u64)
-        .max(1) as usize;
+    let workers = workers_within(limit, layer_bytes);
     let stack_bytes = largest_stack_bytes(&grid, &channels);
     check_disk(arguments, compression, stack_bytes)?;
     Ok(Plan {
@@ -244,9 +239,19 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         channels,
         compression,
         workers,
+        memory_limit: limit,
         layer_bytes,
         stack_bytes,
     })
+}
+
+/// Workers that so much memory has room for, one at least.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "not more than the number of threads"
+)]
+fn workers_within(memory: u64, layer_bytes: u64) -> usize {
+    (memory / layer_bytes.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize
 }
 
 /// Memory that a worker takes: the samples of one layer, their EXR form and what makes it.
@@ -373,10 +378,15 @@ fn stream(
     console: &Console,
 ) -> Result<(f64, f64, Tally), Failure> {
     let interrupted = || interrupt::check().is_err();
-    let sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
+    let mut sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
         .with_kernel(plan.kernel)
         .with_scalars(plan.scalars.clone())
         .with_cancel(&interrupted);
+    if sampler.shared_bytes().saturating_add(plan.layer_bytes) > plan.memory_limit {
+        sampler = sampler.with_exact_distances();
+    }
+    let left = plan.memory_limit.saturating_sub(sampler.shared_bytes());
+    let workers = plan.workers.min(workers_within(left, plan.layer_bytes));
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
@@ -420,7 +430,7 @@ fn stream(
         Ok(())
     };
     rayon::scope(|scope| {
-        for _ in 0..plan.workers {
+        for _ in 0..workers {
             scope.spawn(|_| {
                 let mut buffers = LayerBuffers::default();
                 while !failed.load(Ordering::Relaxed) {
@@ -448,7 +458,7 @@ fn stream(
     }
     // Thread time over the number of workers: the share of the wall time each stage took.
     #[allow(clippy::cast_precision_loss, reason = "times and counts")]
-    let [sample, write] = nanoseconds.map(|n| n.into_inner() as f64 * 1e-9 / plan.workers as f64);
+    let [sample, write] = nanoseconds.map(|n| n.into_inner() as f64 * 1e-9 / workers as f64);
     let tally = tally
         .into_inner()
         .unwrap_or_else(std::sync::PoisonError::into_inner);

@@ -186,11 +186,16 @@ impl StackDirectory {
             .map_err(IoError::write(self.path.join(MANIFEST_NAME)))?;
         (self.syncer.finish()).map_err(|failure| self.not_synced(failure))?;
         self.check_unchanged()?;
-        let mut placed = Vec::new();
-        let result = self.place(&mut placed);
+        let (mut placed, mut aside) = (Vec::new(), Vec::new());
+        let result = self.place(&mut placed, &mut aside);
         if result.is_err() {
-            for path in placed {
+            // The manifest came last and goes first: no manifest is without its files.
+            for path in placed.into_iter().rev() {
                 let _ = fs::remove_file(path);
+            }
+            // And the old one comes back last.
+            for name in aside.iter().rev() {
+                let _ = fs::rename(self.aside_path().join(name), self.path.join(name));
             }
         } else {
             self.committed = true;
@@ -226,15 +231,25 @@ impl StackDirectory {
         Ok(())
     }
 
-    fn place(&self, placed: &mut Vec<PathBuf>) -> Result<(), IoError> {
-        let manifest = self.path.join(MANIFEST_NAME);
+    /// Where old files are until the new ones are in their place.
+    fn aside_path(&self) -> PathBuf {
+        self.staging_path().join("old")
+    }
+
+    /// Moves old files aside, whose names it adds to `aside`, and new ones, whose paths it adds to `placed`, to their
+    /// place.
+    fn place(&self, placed: &mut Vec<PathBuf>, aside: &mut Vec<String>) -> Result<(), IoError> {
+        if self.had_manifest || !self.replaced.is_empty() {
+            let old = self.aside_path();
+            fs::create_dir(&old).map_err(IoError::write(&old))?;
+        }
         if self.had_manifest {
-            remove_regular(&manifest)?;
+            self.move_aside(MANIFEST_NAME, aside)?;
             // From here on no manifest may describe files that are going.
             sync_directory(&self.path)?;
         }
         for name in &self.replaced {
-            remove_regular(&self.path.join(name))?;
+            self.move_aside(name, aside)?;
         }
         let mut rename = |name: &str| {
             let target = self.path.join(name);
@@ -248,10 +263,25 @@ impl StackDirectory {
         sync_directory(&self.path)?;
         rename(MANIFEST_NAME)?;
         sync_directory(&self.path)?;
-        // A new directory is safe once the one that names it is.
+        // A new directory is safe once the one that names it is; one that may not be read cannot be synced.
         for created in &self.created {
-            sync_directory(&parent(created))?;
+            match sync_directory(&parent(created)) {
+                Err(IoError::Write { source, .. })
+                    if source.kind() == std::io::ErrorKind::PermissionDenied => {}
+                other => other?,
+            }
         }
+        Ok(())
+    }
+
+    /// Moves an old file out of the way; one that is gone is no loss, one that is no file is left and refused.
+    fn move_aside(&self, name: &str, aside: &mut Vec<String>) -> Result<(), IoError> {
+        let path = self.path.join(name);
+        if !is_regular(&path)? {
+            return Ok(());
+        }
+        fs::rename(&path, self.aside_path().join(name)).map_err(IoError::write(&path))?;
+        aside.push(name.into());
         Ok(())
     }
 }
@@ -406,11 +436,12 @@ fn remove_if_empty(created: &[PathBuf]) {
 }
 
 /// Removes a file unless it is gone already; what is not a regular file stays and is an error.
-fn remove_regular(path: &Path) -> Result<(), IoError> {
+/// Whether there is a file to be replaced.
+fn is_regular(path: &Path) -> Result<bool, IoError> {
     match fs::symlink_metadata(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
         Err(error) => Err(IoError::write(path)(error)),
-        Ok(data) if data.is_file() => fs::remove_file(path).map_err(IoError::write(path)),
+        Ok(data) if data.is_file() => Ok(true),
         Ok(_) => Err(IoError::Occupied { path: path.into() }),
     }
 }
@@ -567,6 +598,34 @@ mod tests {
         drop(stack);
         assert_eq!(listing(&out), ["manifest.json", "slice-0000.exr"]);
         assert_eq!(fs::read(out.join("slice-0000.exr")).unwrap(), b"old");
+    }
+
+    #[test]
+    fn a_commit_that_fails_brings_the_old_stack_back() {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("out");
+        fs::create_dir_all(&out).unwrap();
+        let manifest = old_manifest(&["slice-0000.exr", "slice-0001.exr"]);
+        fs::write(out.join("manifest.json"), &manifest).unwrap();
+        for name in ["slice-0000.exr", "slice-0001.exr"] {
+            fs::write(out.join(name), "old").unwrap();
+        }
+        let stack = StackDirectory::create(&out, true).unwrap();
+        stack.write_file("slice-0000.exr", b"new").unwrap();
+        // Somebody puts a directory where an old slice was.
+        fs::remove_file(out.join("slice-0001.exr")).unwrap();
+        fs::create_dir(out.join("slice-0001.exr")).unwrap();
+        let error = stack.commit(b"{}\n").unwrap_err();
+        assert!(matches!(error, IoError::Occupied { .. }), "{error}");
+        assert_eq!(
+            listing(&out),
+            ["manifest.json", "slice-0000.exr", "slice-0001.exr"]
+        );
+        assert_eq!(fs::read(out.join("slice-0000.exr")).unwrap(), b"old");
+        assert_eq!(
+            fs::read(out.join("manifest.json")).unwrap(),
+            manifest.as_bytes()
+        );
     }
 
     #[test]

@@ -108,8 +108,11 @@ impl Syncer {
             _ => Some(job),
         };
         refused.map_or(Ok(()), |job| {
-            let Job { name, file } = job;
-            file.sync_all().map_err(|error| Failure { name, error })
+            if let Err(error) = job.file.sync_all() {
+                // Kept, so that no caller who goes on regardless ends with a file that is not there.
+                self.shared.fail(job.name, error);
+            }
+            self.check()
         })
     }
 

@@ -121,6 +121,15 @@ impl MeridianField {
         &self.chain
     }
 
+    /// Bytes of what is kept.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.quarters)
+            + size_of_val(&*self.leaves)
+            + size_of_val(&*self.pool)
+            + size_of_val(&*self.distances)
+            + self.chain.bytes()
+    }
+
     /// Side of the smallest cells.
     pub(crate) fn cell(&self) -> f64 {
         self.cell

@@ -209,10 +209,19 @@ impl<'a> LayerSampler<'a> {
     #[must_use]
     pub fn bytes_per_layer(grid: &GridSpec, selection: &Selection) -> u64 {
         let each = |on: bool, bytes: u64| if on { bytes } else { 0 };
-        grid.layer_len() as u64
-            * (1 + each(selection.fraction, 4)
-                + each(selection.sdf, 4)
-                + each(selection.material, 4))
+        // A bit of each voxel is kept beside its byte.
+        grid.layer_len() as u64 / 8
+            + grid.layer_len() as u64
+                * (1 + each(selection.fraction, 4)
+                    + each(selection.sdf, 4)
+                    + each(selection.material, 4))
+    }
+
+    /// Bytes that the sampler itself keeps for all threads, beside the layers' buffers: tables for distances, which
+    /// [`with_exact_distances`](Self::with_exact_distances) does without.
+    #[must_use]
+    pub fn shared_bytes(&self) -> u64 {
+        self.radial.as_ref().map_or(0, RadialSampler::bytes)
     }
 
     /// Fills `out` with layer `k`.
@@ -347,6 +356,7 @@ impl<'a> LayerSampler<'a> {
         };
         let writing = Writing {
             kernel: self.kernel,
+            cancel: self.cancel,
             band: self.selection.band.unwrap_or(f64::INFINITY),
             past_caches,
         };

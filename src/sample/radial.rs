@@ -13,7 +13,7 @@
 //! max(2 ulp, 1e-4 of the least spacing).
 
 use super::bits;
-use super::layer::stored;
+use super::layer::{Cancel, stored};
 use super::memory::{self, write_past_caches};
 use super::mirror::{MirroredRows, Parts};
 use super::plane::{BLOCK, Plane};
@@ -56,7 +56,7 @@ pub(super) struct RadialScratch {
     /// The stored parts of some rows.
     parts: Vec<f32>,
     doubts: Vec<u8>,
-    /// Voxels of the layer whose sign the exact path tells.
+    /// Voxels of those rows whose sign the exact path tells.
     close: Vec<[usize; 2]>,
 }
 
@@ -69,9 +69,10 @@ pub(super) struct KnownLayer<'a> {
 }
 
 /// Where and how a layer is written.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Writing {
+#[derive(Clone, Copy)]
+pub(super) struct Writing<'a> {
     pub(super) kernel: Kernel,
+    pub(super) cancel: Option<Cancel<'a>>,
     /// Distances are clamped to ± this.
     pub(super) band: f64,
     /// Whether the layer is large and not read soon.
@@ -125,7 +126,7 @@ impl RadialSampler {
         body: &Revolved,
         grid: &GridSpec,
         known: KnownLayer<'_>,
-        writing: Writing,
+        writing: Writing<'_>,
         scratch: &mut RadialScratch,
         out: &mut [f32],
     ) {
@@ -171,17 +172,25 @@ impl RadialSampler {
                 }
             }
             self.write(first..next, nx, writing, &scratch.parts, out);
-            first = next;
-        }
-        for &[i, j] in &scratch.close {
-            for j in std::iter::once(j).chain(self.plane.twin(j)) {
-                for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
-                    let side = bits::get(inside, j * nx + i);
-                    let distance = body.distance(grid.centre(i, j, k), side, band);
-                    out[j * nx + i] = stored(signed(distance, side).clamp(-band, band));
+            for [i, j] in scratch.close.drain(..) {
+                if writing.cancel.is_some_and(|cancel| cancel()) {
+                    return;
+                }
+                for j in std::iter::once(j).chain(self.plane.twin(j)) {
+                    for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
+                        let side = bits::get(inside, j * nx + i);
+                        let distance = body.distance(grid.centre(i, j, k), side, band);
+                        out[j * nx + i] = stored(signed(distance, side).clamp(-band, band));
+                    }
                 }
             }
+            first = next;
         }
+    }
+
+    /// Bytes that all threads share.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.plane.bytes() + self.field.bytes()) as u64
     }
 
     /// Writes the rows whose parts are computed, and those that mirror them.
@@ -189,7 +198,7 @@ impl RadialSampler {
         &self,
         rows: Range<usize>,
         nx: usize,
-        writing: Writing,
+        writing: Writing<'_>,
         values: &[f32],
         out: &mut [f32],
     ) {

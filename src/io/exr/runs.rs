@@ -87,8 +87,9 @@ fn append_tokens(bytes: &[u8], out: &mut Vec<u8>) {
             out.extend_from_slice(&[token(run - 1), rest[0]]);
             rest = &rest[run..];
         } else {
-            // Up to where the next run begins.
-            let next = rest[run..]
+            // Up to where the next run begins, as far as a token reaches.
+            let reach = rest.len().min(MAX_LITERAL + MIN_RUN);
+            let next = rest[run..reach]
                 .windows(MIN_RUN)
                 .position(|w| w[0] == w[1] && w[1] == w[2]);
             let literal = next.map_or(rest.len(), |n| run + n).min(MAX_LITERAL);
