@@ -36,6 +36,19 @@ pub(crate) fn get(words: &[u64], at: usize) -> bool {
     words[at / 64] >> (at % 64) & 1 != 0
 }
 
+/// The bits of sixteen voxels, the first the lowest; 0 beyond the last word.
+#[inline]
+pub(crate) fn sixteen(words: &[u64], at: usize) -> u16 {
+    let (word, shift) = (at / 64, at % 64);
+    let mut found = words[word] >> shift;
+    if shift > 48
+        && let Some(next) = words.get(word + 1)
+    {
+        found |= next << (64 - shift);
+    }
+    (found & 0xffff) as u16
+}
+
 /// Sets the bit of one voxel.
 #[inline]
 pub(crate) fn set(words: &mut [u64], at: usize, value: bool) {

@@ -3,6 +3,7 @@
 use super::bits;
 use super::fraction::FractionSampler;
 use super::memory::expand_past_caches;
+use super::partial::{PartialSampler, PartialScratch};
 use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
 use super::tally::{Certainty, Tally};
 use super::upright::{UprightBody, UprightScratch};
@@ -91,8 +92,9 @@ pub struct LayerSampler<'a> {
     kernel: Kernel,
     /// The rows of the one body, where its axis is parallel to grid z.
     upright: Option<UprightBody>,
-    /// The distances of such a body.
+    /// The distances of such a body, fully turned or not.
     radial: Option<RadialSampler>,
+    partial: Option<PartialSampler>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -111,6 +113,7 @@ pub(super) struct LayerScratch {
     inside: Vec<u64>,
     upright: UprightScratch,
     radial: RadialScratch,
+    partial: PartialScratch,
 }
 
 /// What is left to the rows.
@@ -172,6 +175,7 @@ impl<'a> LayerSampler<'a> {
             kernel: Kernel::default(),
             upright,
             radial: radial.and_then(|b| RadialSampler::new(b, grid)),
+            partial: radial.and_then(|b| PartialSampler::new(b, grid)),
         }
     }
 
@@ -186,6 +190,7 @@ impl<'a> LayerSampler<'a> {
     pub fn with_exact_distances(self) -> Self {
         Self {
             radial: None,
+            partial: None,
             ..self
         }
     }
@@ -221,7 +226,8 @@ impl<'a> LayerSampler<'a> {
     /// [`with_exact_distances`](Self::with_exact_distances) does without.
     #[must_use]
     pub fn shared_bytes(&self) -> u64 {
-        self.radial.as_ref().map_or(0, RadialSampler::bytes)
+        let full = self.radial.as_ref().map_or(0, RadialSampler::bytes);
+        full + self.partial.as_ref().map_or(0, PartialSampler::bytes)
     }
 
     /// Fills `out` with layer `k`.
@@ -351,7 +357,7 @@ impl<'a> LayerSampler<'a> {
         out: &mut [f32],
         past_caches: bool,
     ) -> bool {
-        let (Some((body, _)), Some(radial)) = (self.upright_body(), &self.radial) else {
+        let Some((body, _)) = self.upright_body() else {
             return false;
         };
         let writing = Writing {
@@ -363,9 +369,17 @@ impl<'a> LayerSampler<'a> {
         let LayerScratch {
             inside,
             radial: own,
+            partial: own_partial,
             ..
         } = scratch;
-        radial.layer(body, self.grid, KnownLayer { k, inside }, writing, own, out);
+        let known = KnownLayer { k, inside };
+        if let Some(radial) = &self.radial {
+            radial.layer(body, self.grid, known, writing, own, out);
+        } else if let Some(partial) = &self.partial {
+            partial.layer(body, self.grid, known, writing, own_partial, out);
+        } else {
+            return false;
+        }
         true
     }
 
@@ -407,7 +421,7 @@ impl<'a> LayerSampler<'a> {
 
     /// Whether [`distance_into`](Self::distance_into) serves.
     pub(super) fn fills_distance(&self) -> bool {
-        self.radial.is_some()
+        self.radial.is_some() || self.partial.is_some()
     }
 
     /// Fills one layer of occupancy in a large buffer.

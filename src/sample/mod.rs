@@ -11,16 +11,20 @@
 //!   upright   rings of a layer ──> ends of all rows ──> bits, 64 voxels a word ──> bytes
 //!   plane     radii of a layer's voxels, once for the grid
 //!   radial    a table of cubics over the radii of a layer ──spread──> rows
+//!   partial   the same for less than a full turn, with a second table along its caps
 //!   memory    stores past the caches, large pages
 //! ```
 
 mod bits;
+mod caps;
 mod divided;
 mod fraction;
 mod layer;
 mod memory;
 mod mirror;
+mod partial;
 mod plane;
+mod queue;
 mod radial;
 mod spread;
 mod tally;

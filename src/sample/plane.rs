@@ -137,6 +137,20 @@ impl Plane {
         self.radii.iter().max().map_or(0, |r| (r >> 16) + 1)
     }
 
+    /// Completes a row whose stored part is filled.
+    pub(super) fn mirror<T: Copy>(&self, row: &mut [T]) {
+        // In parts of fixed length, which the compiler reverses in registers.
+        let (left, right) = row.split_at_mut(self.stored);
+        let (left, from) = left[..right.len()].as_chunks::<16>();
+        let (to, right) = right.as_rchunks_mut::<16>();
+        for (b, a) in right.iter_mut().rev().zip(left) {
+            *b = std::array::from_fn(|n| a[15 - n]);
+        }
+        for (b, a) in to.iter_mut().rev().zip(from) {
+            *b = *a;
+        }
+    }
+
     /// The row that mirrors row `j`.
     pub(super) fn twin(&self, j: usize) -> Option<usize> {
         let twin = self.layer_rows - 1 - j;

@@ -157,6 +157,11 @@ impl Revolved {
         self.side(point) != Side::Outside
     }
 
+    /// Whether the closed region holds a point of the plane through the axis, in its unit.
+    pub(crate) fn section_holds(&self, [r, z]: [f64; 2]) -> bool {
+        r >= 0.0 && self.section.side_of(r, z) != Side::Outside
+    }
+
     /// The pieces around the turned region, in its unit.
     pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
         &self.boundary
@@ -214,7 +219,7 @@ impl Revolved {
             if across >= best {
                 continue;
             }
-            let in_section = along >= 0.0 && self.section.side_of(along, p.z) != Side::Outside;
+            let in_section = self.section_holds([along, p.z]);
             let distance = if in_section {
                 across
             } else {

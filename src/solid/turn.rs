@@ -5,6 +5,15 @@ use crate::math::tolerance::{ON_BOUNDARY, U};
 use crate::math::{Dd, Real};
 use glam::DVec2;
 
+/// The middle of a wedge, and half the angle turned.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HalfTurn {
+    /// Unit direction in the middle of the turn, in the plane normal to the axis.
+    pub(crate) middle: [f64; 2],
+    pub(crate) sin: f64,
+    pub(crate) cos: f64,
+}
+
 /// A full turn, or the wedge between two half-planes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Turn {
@@ -69,6 +78,16 @@ impl Turn {
         let half = Dd::of(0.5 * self.degrees());
         let (sin, cos) = half.sin_cos_degrees();
         (half * Dd::PI / Dd::of(180.0), sin, cos)
+    }
+
+    /// Either half of the wedge; `None` of a full turn.
+    pub(crate) fn halves(&self) -> Option<HalfTurn> {
+        let (_, sin, cos) = self.half();
+        (*self != Self::Full).then(|| HalfTurn {
+            middle: self.middle().map(Real::f64),
+            sin: sin.f64(),
+            cos: cos.f64(),
+        })
     }
 
     /// The direction in the middle of the turn.

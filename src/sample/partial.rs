@@ -1,0 +1,457 @@
+//! Signed distances of one upright body that is turned less than a full turn, a layer at a time.
+//!
+//! Such a body is bounded by the swept surface and by two flat caps. Each layer gets two tables ([`RadialTable`]):
+//! S, the distance to the whole turn, over the radii; and E, that to the section in a cap's plane, over the
+//! length along it, which goes on below 0. With a and s the place of a voxel by its nearer cap ([`super::caps`]):
+//!
+//! ```text
+//!   cap   = hypot(s, max(E(a), 0))       in the section E < 0 and the cap's face is nearest
+//!   |sdf| = cap                          outside the wedge
+//!           S                            outside the solid in the wedge: no point of the whole turn is nearer
+//!           min(S, cap)                  inside
+//! ```
+//!
+//! The sign is the membership's bit. Groups of voxels that no cap can be nearest to take S alone; S is the same for
+//! voxels that mirror each other about the grid's middle, and is spread once for them. What the tables do not hold is
+//! mended voxel by voxel, and what is so near to the surface that the sign is in question is the exact path's.
+//!
+//! ```text
+//!   |stored - exact| <= arcs 2e-5 + cubics 2.2e-5 + places 1.6e-5 + sums 0.2e-5 of the least spacing + 1 ulp
+//! ```
+//!
+//! The shares of S and of E are those of [`super::radial`] and [`super::plane`], with cells of at most two least
+//! spacings. hypot passes on E's error with a factor of at most 1: half an ulp from E's form as an f32, half an ulp
+//! from its own, as the rest is done in f64. Below 512 least spacings an ulp is at most 3.1e-5 of them, from there to
+//! 1024 it is 6.2e-5 and 2 ulp are allowed: the sum stays within max(2 ulp, 1e-4 of the least spacing).
+
+use super::bits;
+use super::caps::{
+    CapGroups, CapPlane, CapRow, GROUP, Given, Places, SweptGroups, combined, dispatch,
+};
+use super::layer::stored;
+use super::plane::{BLOCK, PLACES, Plane, Radii};
+use super::queue::RowQueue;
+use super::radial::{KnownLayer, Writing};
+use super::spread::spread;
+use crate::grid::GridSpec;
+use crate::math::{Dd, Kernel, Real};
+use crate::region::{BoundaryPiece, Chain, Extent, MeridianField, RadialTable};
+use crate::solid::{Revolved, signed};
+
+/// Shares of the least spacing.
+const ARCS: f64 = 2.0e-5;
+const CUBICS: f64 = 2.2e-5;
+/// Nearer to the surface than this the exact path answers.
+const NEAR: f64 = 2e-4;
+/// The most least spacings of a cell: places are rounded to 2^-17 of it.
+const WIDEST: f64 = 2.0;
+/// The most arcs a boundary is replaced by.
+const MOST_ARCS: usize = 20_000;
+/// Finest arcs, in the region's unit: below it their own rounding counts.
+const FINEST: f64 = 1e-12;
+/// Distance of a cell's middle, in cells, from which on the boundary is not in the cell.
+const CLEAR: f64 = 0.75;
+
+/// Distances of one body on one grid.
+#[derive(Debug)]
+pub(super) struct PartialSampler {
+    swept: MeridianField,
+    edges: MeridianField,
+    plane: Plane,
+    caps: CapPlane,
+    /// What the cubics may err by, in the region's unit.
+    tolerance: f64,
+    /// Distances below this are the exact path's, in scene units.
+    near: f32,
+}
+
+/// What one thread reuses.
+#[derive(Debug, Default)]
+pub(super) struct PartialScratch {
+    swept: RadialTable,
+    edges: RadialTable,
+    /// For each column of `edges`, whether the section's boundary may be in it.
+    crossed: Vec<bool>,
+    /// Distances of a row from the swept surface.
+    distances: Vec<f32>,
+    marks: Vec<u8>,
+    row: Vec<f32>,
+    own: RowScratch,
+    queue: RowQueue,
+}
+
+/// What a row of voxels takes.
+#[derive(Debug, Default)]
+struct RowScratch {
+    inside: Vec<u16>,
+    wanted: Vec<bool>,
+    doubts: Vec<bool>,
+    places: Vec<u32>,
+    cells: Vec<u32>,
+    edges: Vec<f32>,
+    marks: Vec<u8>,
+}
+
+/// One layer as its rows see it.
+struct Layer<'a> {
+    body: &'a Revolved,
+    grid: &'a GridSpec,
+    known: KnownLayer<'a>,
+    writing: Writing<'a>,
+    height: f64,
+    swept: &'a RadialTable,
+    edges: &'a RadialTable,
+    crossed: &'a [bool],
+}
+
+impl PartialSampler {
+    /// The sampler of a body; `None` where it is not upright or fully turned, or its numbers leave the tables no room.
+    pub(super) fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
+        if !body.rows().is_upright() {
+            return None;
+        }
+        let frame = body.frame();
+        let scale = frame.scale();
+        let spacing = grid.spacing();
+        let least = spacing.min_element() / scale;
+        if !(ARCS * least >= FINEST) {
+            return None;
+        }
+        let side = spacing.x.min(WIDEST * spacing.min_element());
+        let caps = CapPlane::new(body, grid, side)?;
+        let axis = frame.origin_exact();
+        let plane = Plane::new(grid, [axis[0], axis[1]], side)?;
+        let height = |k: usize| frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
+        let (a, b) = (height(0), height(grid.dims()[2] - 1));
+        let cell = (Dd::of(side) / frame.scale_exact()).f64();
+        let field = |pieces: &[BoundaryPiece], r: [f64; 2], mirrored: bool| {
+            let chain = Chain::new(pieces, ARCS * least, MOST_ARCS, mirrored)?;
+            let z = [a.min(b), a.max(b)];
+            MeridianField::new(chain, Extent { r, z, cell })
+        };
+        let pieces = body.boundary().iter().filter(|b| !b.piece.on_axis);
+        let pieces: Vec<_> = pieces.cloned().collect();
+        let swept = field(&pieces, [0.0, f64::from(plane.reach()) * cell], true)?;
+        let [low, high] = caps.reach().map(|a| a / scale);
+        let edges = field(body.boundary(), [low - cell, high + cell], false)?;
+        #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
+        let near = (NEAR * spacing.min_element()) as f32;
+        Some(Self {
+            caps: caps.from_column(edges.columns().1),
+            swept,
+            edges,
+            plane,
+            tolerance: CUBICS * least,
+            near,
+        })
+    }
+
+    /// Bytes that all threads share.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.plane.bytes() + self.swept.bytes() + self.edges.bytes()) as u64
+    }
+
+    /// Fills a layer with signed distances.
+    pub(super) fn layer(
+        &self,
+        body: &Revolved,
+        grid: &GridSpec,
+        known: KnownLayer<'_>,
+        writing: Writing<'_>,
+        scratch: &mut PartialScratch,
+        out: &mut [f32],
+    ) {
+        let nx = grid.dims()[0];
+        let frame = body.frame();
+        let height = frame.to_local_exact(grid.centre(0, 0, known.k))[2].f64();
+        let (scale, tolerance) = (frame.scale(), self.tolerance);
+        scratch.swept.fill(&self.swept, height, scale, tolerance);
+        scratch.edges.fill(&self.edges, height, scale, tolerance);
+        self.settle(body, height, &mut scratch.edges, &mut scratch.crossed);
+        let PartialScratch {
+            swept,
+            edges,
+            crossed,
+            distances,
+            marks,
+            row,
+            own,
+            queue,
+        } = scratch;
+        let layer = Layer {
+            body,
+            grid,
+            known,
+            writing,
+            height,
+            swept,
+            edges,
+            crossed,
+        };
+        let padded = self.caps.x().len();
+        distances.resize(padded.max(self.plane.stored().1), 0.0);
+        row.resize(padded, 0.0);
+        own.resize(padded);
+        queue.start(nx);
+        let rows = self.plane.len();
+        for n in 0..rows {
+            self.swept_row(&layer, self.plane.radii(n..n + 1), distances, marks);
+            let twin = self.plane.twin(n);
+            for (j, is_twin) in std::iter::once((n, false)).chain(twin.map(|t| (t, true))) {
+                self.row(&layer, j, &distances[..padded], own, row);
+                if !writing.past_caches {
+                    out[j * nx..(j + 1) * nx].copy_from_slice(&row[..nx]);
+                } else if is_twin {
+                    queue.push_behind(&row[..nx]);
+                } else {
+                    queue.push_ahead(&row[..nx]);
+                }
+            }
+            if writing.past_caches && (queue.is_full() || n + 1 == rows) {
+                queue.write(writing.kernel, out);
+            }
+        }
+    }
+
+    /// Gives columns without a cubic that are in the section all over a value that says so, and finds those that the
+    /// boundary may cross.
+    fn settle(
+        &self,
+        body: &Revolved,
+        height: f64,
+        table: &mut RadialTable,
+        crossed: &mut Vec<bool>,
+    ) {
+        let (columns, first) = self.edges.columns();
+        crossed.clear();
+        crossed.resize(columns, false);
+        let cell = self.edges.cell();
+        let clear = CLEAR * cell * body.frame().scale();
+        for (k, crossed) in crossed.iter_mut().enumerate() {
+            if !table.coefficients[0][k].is_nan() {
+                continue;
+            }
+            #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+            let middle = ((first + k as i64) as f64 + 0.5) * cell;
+            if table.mended(&self.edges, k, middle) < clear {
+                *crossed = true;
+            } else if body.section_holds([middle, height]) {
+                table.coefficients[0][k] = -1.0;
+            }
+        }
+    }
+
+    /// Fills a row's distances from the swept surface, of either sign.
+    fn swept_row(
+        &self,
+        layer: &Layer<'_>,
+        radii: Radii<'_>,
+        distances: &mut [f32],
+        marks: &mut Vec<u8>,
+    ) {
+        let (columns, padded) = self.plane.stored();
+        let nx = layer.grid.dims()[0];
+        marks.resize(padded / BLOCK, 0);
+        let coefficients = layer.swept.coefficients.each_ref().map(Vec::as_slice);
+        let kernel = layer.writing.kernel;
+        // Only what is not a number is told apart here.
+        spread(
+            kernel,
+            radii,
+            coefficients,
+            0.0,
+            &mut distances[..padded],
+            marks,
+        );
+        let per_place = self.swept.cell() / PLACES;
+        for (block, &marks) in marks.iter().enumerate().filter(|(_, m)| **m != 0) {
+            let mut marks = marks;
+            while marks != 0 {
+                let i = block * BLOCK + marks.trailing_zeros() as usize;
+                marks &= marks - 1;
+                if i < columns {
+                    let (column, r) = (radii.radii[i] >> 16, f64::from(radii.radii[i]) * per_place);
+                    let distance = layer.swept.mended(&self.swept, column as usize, r);
+                    distances[i] = stored(distance);
+                }
+            }
+        }
+        self.plane.mirror(&mut distances[..nx]);
+        // Lanes beyond the last voxel see what it sees.
+        let last = distances[nx - 1];
+        distances[nx..].fill(last);
+    }
+
+    /// Fills row `j` from its distances to the swept surface.
+    fn row(
+        &self,
+        layer: &Layer<'_>,
+        j: usize,
+        distances: &[f32],
+        scratch: &mut RowScratch,
+        out: &mut [f32],
+    ) {
+        let nx = layer.grid.dims()[0];
+        let Writing { kernel, band, .. } = layer.writing;
+        let row = self.caps.row(j);
+        for (g, bits) in scratch.inside.iter_mut().enumerate() {
+            *bits = bits::sixteen(layer.known.inside, j * nx + g * GROUP);
+        }
+        let band = stored(band);
+        let given = Given {
+            row,
+            x: self.caps.x(),
+            inside: &scratch.inside,
+            swept: distances,
+            least: self.near.min(band),
+            band,
+        };
+        dispatch(
+            kernel,
+            SweptGroups {
+                given,
+                wanted: &mut scratch.wanted,
+                out,
+                doubts: &mut scratch.doubts,
+            },
+        );
+        let groups = scratch.wanted.len();
+        let mut from = 0;
+        while from < groups {
+            if !scratch.wanted[from] {
+                from += 1;
+                continue;
+            }
+            let run = scratch.wanted[from..].iter().take_while(|w| **w).count();
+            let to = from + run;
+            self.caps_run(
+                layer,
+                kernel,
+                given,
+                [from, to],
+                RunScratch {
+                    places: &mut scratch.places,
+                    cells: &mut scratch.cells,
+                    edges: &mut scratch.edges,
+                    marks: &mut scratch.marks,
+                    doubts: &mut scratch.doubts[from..to],
+                },
+                &mut out[from * GROUP..to * GROUP],
+            );
+            from = to;
+        }
+        for g in (0..groups).filter(|g| scratch.doubts[*g]) {
+            for i in g * GROUP..((g + 1) * GROUP).min(nx) {
+                if !(out[i].abs() >= given.least) {
+                    out[i] = self.mended(layer, [i, j], row, distances[i]);
+                }
+            }
+        }
+    }
+
+    /// Fills a run of groups that caps may be nearest to.
+    fn caps_run(
+        &self,
+        layer: &Layer<'_>,
+        kernel: Kernel,
+        given: Given<'_>,
+        [from, to]: [usize; 2],
+        scratch: RunScratch<'_>,
+        out: &mut [f32],
+    ) {
+        let lanes = from * GROUP..to * GROUP;
+        let length = lanes.len();
+        let given = Given {
+            x: &given.x[lanes.clone()],
+            inside: &given.inside[from..to],
+            swept: &given.swept[lanes],
+            ..given
+        };
+        let places = &mut scratch.places[..length];
+        let cells = &mut scratch.cells[..length / BLOCK];
+        let edges = &mut scratch.edges[..length];
+        dispatch(
+            kernel,
+            Places {
+                row: given.row,
+                x: given.x,
+                scattered: self.caps.is_scattered(),
+                places,
+                cells,
+            },
+        );
+        let coefficients = layer.edges.coefficients.each_ref().map(Vec::as_slice);
+        let places = Radii {
+            radii: places,
+            blocks: cells,
+        };
+        let marks = &mut scratch.marks[..length / BLOCK];
+        spread(kernel, places, coefficients, 0.0, edges, marks);
+        dispatch(
+            kernel,
+            CapGroups {
+                given,
+                edges,
+                out,
+                doubts: scratch.doubts,
+            },
+        );
+    }
+
+    /// The value of a voxel that the tables do not tell, from its distance to the swept surface.
+    fn mended(&self, layer: &Layer<'_>, [i, j]: [usize; 2], row: CapRow, swept: f32) -> f32 {
+        let (grid, known) = (layer.grid, layer.known);
+        let inside = bits::get(known.inside, j * grid.dims()[0] + i);
+        let x = self.caps.x()[i];
+        let [place, _] = row.at(x);
+        let (columns, first) = self.edges.columns();
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "a column of the table"
+        )]
+        let (column, along) = (
+            ((place / PLACES) as usize).min(columns - 1),
+            (place / PLACES + first as f64) * self.edges.cell(),
+        );
+        let edge = if layer.crossed[column] && layer.body.section_holds([along, layer.height]) {
+            0.0
+        } else {
+            layer.edges.mended(&self.edges, column, along)
+        };
+        let value = combined(row, x, swept, stored(edge), inside);
+        let band = layer.writing.band;
+        let distance = if value >= self.near {
+            f64::from(value)
+        } else {
+            layer
+                .body
+                .distance(grid.centre(i, j, known.k), inside, band)
+        };
+        stored(signed(distance, inside).clamp(-band, band))
+    }
+}
+
+/// The parts of a row's scratch that a run of groups uses.
+struct RunScratch<'a> {
+    places: &'a mut [u32],
+    cells: &'a mut [u32],
+    edges: &'a mut [f32],
+    marks: &'a mut [u8],
+    doubts: &'a mut [bool],
+}
+
+impl RowScratch {
+    /// Makes room for rows of `padded` voxels.
+    fn resize(&mut self, padded: usize) {
+        let groups = padded / GROUP;
+        self.inside.resize(groups, 0);
+        self.wanted.resize(groups, false);
+        self.doubts.resize(groups, false);
+        self.places.resize(padded, 0);
+        self.cells.resize(padded / BLOCK, 0);
+        self.edges.resize(padded, 0.0);
+        self.marks.resize(padded / BLOCK, 0);
+    }
+}
