@@ -41,7 +41,7 @@ pub(crate) use curve::{HomogeneousPoint, beziers};
 pub(crate) use field::{Extent, MeridianField};
 pub(crate) use moments::{Estimate, SectionMoments};
 pub(crate) use piece::Piece;
-pub(crate) use radial::RadialTable;
+pub(crate) use radial::{GROUP, Group, RadialTable};
 pub(crate) use section::Section;
 pub(crate) use tree::{Box2, BoxTree};
 pub(crate) use weld::welded;

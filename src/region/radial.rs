@@ -10,7 +10,8 @@
 //! and where features hand over within it, each jump J of the second derivative adds at most `h² J / 60` and each
 //! jump K of the third at most `h³ K / 192` (the Peano kernel of cubic Hermite interpolation, a clamped beam, and
 //! its slope). Cells that may err by more than the tolerance, and those where the distance is not smooth, have NaN
-//! as their first coefficient and are [`mended`](RadialTable::mended) voxel by voxel.
+//! as their first coefficient and are [`mended`](RadialTable::mended) voxel by voxel: where a ridge between smooth
+//! stretches of the boundary crosses the cell, from the cubics of those.
 //!
 //! Source of d⁗: `d = ρ - R` with ρ the distance from the centre, differentiated along a line: `d″ = b τ²`,
 //! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
@@ -18,18 +19,33 @@
 use super::chain::Local;
 use super::field::{MOST_RUNS, MeridianField};
 
+/// Cells whose coefficients lie together.
+pub(crate) const GROUP: usize = 16;
+
+/// The coefficients of 16 cells: those of 1, t, t² and t³ over each cell, t from 0 to 1, and last what the first of
+/// them lost in rounding.
+pub(crate) type Group = [[f32; GROUP]; 5];
+
 /// Cubics over the cells of one height.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RadialTable {
-    /// Coefficients of 1, t, t² and t³ over each cell, t from 0 to 1, and last what the first of them lost in rounding.
-    pub(crate) coefficients: [Vec<f32>; 5],
+    groups: Vec<Group>,
+    /// Whether what the first coefficients lost is kept, as some distances are large.
+    precise: bool,
     leaves: Vec<u32>,
+    /// For each cell that has some, its part of `cubics`: the first, and how many.
+    ridges: Vec<[u32; 2]>,
+    /// Cubics of the stretches that may be nearest in cells with a ridge.
+    cubics: Vec<[f64; 4]>,
     height: f64,
     scale: f64,
 }
 
-/// Cells read beyond the last one by lanes that do not use them.
-pub(crate) const PADDING: usize = 32;
+/// Groups read beyond the last cell's by lanes that do not use them.
+const PADDING: usize = 2;
+/// Tolerances to which a distance is so small that the rounding of the first coefficient does not count: less than a
+/// fifth of a tolerance.
+const SMALL: f64 = 4_194_304.0;
 /// Features that may follow each other within one cell.
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
@@ -41,12 +57,14 @@ impl RadialTable {
     /// Tabulates height `z` of a field whose unit is `scale` scene units, within `tolerance` region units.
     pub(crate) fn fill(&mut self, field: &MeridianField, z: f64, scale: f64, tolerance: f64) {
         let (columns, first) = field.columns();
-        for c in &mut self.coefficients {
-            c.clear();
-            c.resize(columns + PADDING, 0.0);
-        }
+        self.groups.clear();
+        self.groups
+            .resize(columns / GROUP + PADDING, [[0.0; GROUP]; 5]);
         self.leaves.clear();
         self.leaves.resize(columns, 0);
+        self.ridges.clear();
+        self.ridges.resize(columns, [0; 2]);
+        self.cubics.clear();
         self.height = z;
         self.scale = scale;
         let cell = field.cell();
@@ -57,7 +75,7 @@ impl RadialTable {
             let leaf = field.leaf(number);
             let features = field.features(leaf);
             match (leaf.smooth, features.len()) {
-                (false, _) => self.coefficients[0][from..to].fill(f32::NAN),
+                (false, _) => (from..to).for_each(|k| self.leave_open(k)),
                 (true, 1) => {
                     let mut near = Foot::new(field, features[0], [node(from), z]);
                     for k in from..to {
@@ -70,6 +88,36 @@ impl RadialTable {
                 (true, _) => self.ridge(field, (from, to), z, features, tolerance, &node),
             }
         });
+        #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
+        let small = (SMALL * tolerance * scale) as f32;
+        let large = |v: &f32| v.abs() > small;
+        self.precise = self.groups.iter().any(|g| g[0].iter().any(large));
+        if !self.precise {
+            for group in &mut self.groups {
+                group[4] = [0.0; GROUP];
+            }
+        }
+    }
+
+    /// The coefficients in groups, with some beyond the last cell's; and whether the last of them count.
+    pub(crate) fn groups(&self) -> (&[Group], bool) {
+        (&self.groups, self.precise)
+    }
+
+    /// Whether a cell has no cubic.
+    pub(crate) fn is_open(&self, cell: usize) -> bool {
+        self.groups[cell / GROUP][0][cell % GROUP].is_nan()
+    }
+
+    /// Gives a cell one value all over.
+    pub(crate) fn settle(&mut self, cell: usize, value: f32) {
+        for (n, row) in self.groups[cell / GROUP].iter_mut().enumerate() {
+            row[cell % GROUP] = if n == 0 { value } else { 0.0 };
+        }
+    }
+
+    fn leave_open(&mut self, cell: usize) {
+        self.groups[cell / GROUP][0][cell % GROUP] = f32::NAN;
     }
 
     /// Tabulates a leaf of several runs.
@@ -108,53 +156,77 @@ impl RadialTable {
             // keep their sign where they have it at both ends by more than those. What the arcs err by is added:
             // the sign of the distance is that of the surface that is nearer, not of its arc.
             let q = [node(k + 1), z];
-            let bend = |i: usize| {
-                let passage = Passage::new(field, [&near[i], &far[i]], q);
-                passage.map_or(f64::INFINITY, |p| p.bend)
-            };
+            let passages: smallvec::SmallVec<[Option<Passage>; MOST_RUNS]> = (0..near.len())
+                .map(|i| Passage::new(field, [&near[i], &far[i]], q))
+                .collect();
+            let bend = |i: usize| passages[i].as_ref().map_or(f64::INFINITY, |p| p.bend);
             let own = bend(first);
-            let clear = (0..near.len()).filter(|i| *i != first).all(|i| {
+            let rivals = (0..near.len()).filter(|&i| {
                 let gap = |feet: &Feet| size(&feet[i]) - size(&feet[first]);
                 let bent = h * (bend(i) + own);
-                near[i].local.value * far[i].local.value > 0.0
+                let clear = near[i].local.value * far[i].local.value > 0.0
                     && bent <= BENT
-                    && gap(&near).min(gap(&far)) > 0.25 * h * bent + field.chain().margin()
+                    && gap(&near).min(gap(&far)) > 0.25 * h * bent + field.chain().margin();
+                i == first || !clear
             });
+            let rivals: smallvec::SmallVec<[usize; MOST_RUNS]> = rivals.collect();
+            let good = rivals
+                .iter()
+                .all(|&i| (passages[i].as_ref()).is_some_and(|p| p.error(h) <= tolerance));
+            if good && rivals.len() > 1 {
+                // The distance is the least of theirs, and each is within the tolerance.
+                let start = u32::try_from(self.cubics.len()).unwrap_or(u32::MAX);
+                let length = h * self.scale;
+                let cubics = rivals
+                    .iter()
+                    .map(|&i| self.cubic([&near[i].local, &far[i].local], length));
+                let cubics: smallvec::SmallVec<[[f64; 4]; MOST_RUNS]> = cubics.collect();
+                self.ridges[k] = [start, u32::try_from(cubics.len()).unwrap_or(0)];
+                self.cubics.extend(cubics);
+            }
             let (a, b) = (&near[first], &far[first]);
-            let good = clear && error(field, [a, b], q) <= tolerance;
+            let good = good && rivals.len() == 1;
             self.put(k, good, [&a.local, &b.local], h * self.scale);
             near = far;
         }
+    }
+
+    /// The cubic over a cell of `length`, in scene units, from what its ends know.
+    #[inline]
+    fn cubic(&self, [near, far]: [&Local; 2], length: f64) -> [f64; 4] {
+        let (a, b) = (near.value * self.scale, far.value * self.scale);
+        let (da, db) = (near.gradient[0] * length, far.gradient[0] * length);
+        let rise = b - a;
+        [a, da, 3.0 * rise - 2.0 * da - db, da + db - 2.0 * rise]
     }
 
     #[allow(
         clippy::cast_possible_truncation,
         reason = "coefficients are f32: the stored voxels are"
     )]
-    fn put(&mut self, k: usize, good: bool, [near, far]: [&Local; 2], length: f64) {
+    fn put(&mut self, k: usize, good: bool, ends: [&Local; 2], length: f64) {
         if !good {
-            self.coefficients[0][k] = f32::NAN;
+            self.leave_open(k);
             return;
         }
-        let scale = self.scale;
-        let (a, b) = (near.value * scale, far.value * scale);
-        let (da, db) = (near.gradient[0] * length, far.gradient[0] * length);
-        let rise = b - a;
+        let [a, b, c, d] = self.cubic(ends, length);
         let lost = a - f64::from(a as f32);
-        let cubic = [
-            a,
-            da,
-            3.0 * rise - 2.0 * da - db,
-            da + db - 2.0 * rise,
-            lost,
-        ];
-        for (c, v) in self.coefficients.iter_mut().zip(cubic) {
-            c[k] = v as f32;
+        let group = &mut self.groups[k / GROUP];
+        for (row, v) in group.iter_mut().zip([a, b, c, d, lost]) {
+            row[k % GROUP] = v as f32;
         }
     }
 
     /// The unsigned distance in scene units at `r` region units in a cell without a cubic.
     pub(crate) fn mended(&self, field: &MeridianField, cell: usize, r: f64) -> f64 {
+        let [start, count] = self.ridges[cell].map(|n| n as usize);
+        if count > 0 {
+            #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+            let t = r / field.cell() - (field.columns().1 + cell as i64) as f64;
+            let cubics = self.cubics[start..start + count].iter();
+            let sizes = cubics.map(|[a, b, c, d]| (a + t * (b + t * (c + t * d))).abs());
+            return sizes.fold(f64::INFINITY, f64::min);
+        }
         let leaf = field.leaf(self.leaves[cell]);
         field.distance(leaf, [r, self.height]) * self.scale
     }
@@ -439,8 +511,9 @@ mod tests {
                         #[allow(clippy::cast_precision_loss, reason = "a small count")]
                         let r = (k as f64 + t) * cell;
                         let truth = exact.distance([r, z], f64::INFINITY);
-                        let [a, b, c, d, lost] =
-                            std::array::from_fn(|i| f64::from(table.coefficients[i][k]));
+                        let [a, b, c, d, lost] = std::array::from_fn(|i| {
+                            f64::from(table.groups[k / GROUP][i][k % GROUP])
+                        });
                         all += 1;
                         let found = if a.is_nan() {
                             special += 1;

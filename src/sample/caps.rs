@@ -98,7 +98,7 @@ impl CapPlane {
             per_length: PLACES / cell,
             axis_place: 0.0,
             guard: GUARD * least,
-            scattered: span + 2.0 >= f64::from(REACH),
+            scattered: span + 1.5 >= f64::from(REACH),
         })
     }
 

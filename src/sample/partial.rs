@@ -228,7 +228,7 @@ impl PartialSampler {
         let cell = self.edges.cell();
         let clear = CLEAR * cell * body.frame().scale();
         for (k, crossed) in crossed.iter_mut().enumerate() {
-            if !table.coefficients[0][k].is_nan() {
+            if !table.is_open(k) {
                 continue;
             }
             #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
@@ -236,7 +236,7 @@ impl PartialSampler {
             if table.mended(&self.edges, k, middle) < clear {
                 *crossed = true;
             } else if body.section_holds([middle, height]) {
-                table.coefficients[0][k] = -1.0;
+                table.settle(k, -1.0);
             }
         }
     }
@@ -252,13 +252,12 @@ impl PartialSampler {
         let (columns, padded) = self.plane.stored();
         let nx = layer.grid.dims()[0];
         marks.resize(padded / BLOCK, 0);
-        let coefficients = layer.swept.coefficients.each_ref().map(Vec::as_slice);
         let kernel = layer.writing.kernel;
         // Only what is not a number is told apart here.
         spread(
             kernel,
             radii,
-            coefficients,
+            layer.swept,
             0.0,
             &mut distances[..padded],
             marks,
@@ -380,13 +379,12 @@ impl PartialSampler {
                 cells,
             },
         );
-        let coefficients = layer.edges.coefficients.each_ref().map(Vec::as_slice);
         let places = Radii {
             radii: places,
             blocks: cells,
         };
         let marks = &mut scratch.marks[..length / BLOCK];
-        spread(kernel, places, coefficients, 0.0, edges, marks);
+        spread(kernel, places, layer.edges, 0.0, edges, marks);
         dispatch(
             kernel,
             CapGroups {

@@ -14,8 +14,8 @@ pub(super) const BLOCK: usize = 8;
 pub(super) const LANES: usize = 16;
 /// Marks a block whose cells are too far apart for lanes to reach.
 pub(super) const SCATTERED: u32 = u32::MAX;
-/// Cells that lanes reach from a block's first.
-pub(super) const REACH: u32 = 16;
+/// Cells that lanes reach from a block's first: a window of 16 that starts at a multiple of 8 holds them.
+pub(super) const REACH: u32 = 9;
 /// Places of a cell.
 pub(super) const PLACES: f64 = 65_536.0;
 

@@ -150,7 +150,7 @@ impl RadialSampler {
             spread(
                 kernel,
                 self.plane.radii(first..next),
-                scratch.table.coefficients.each_ref().map(Vec::as_slice),
+                &scratch.table,
                 self.near,
                 &mut scratch.parts,
                 &mut scratch.doubts,

@@ -4,8 +4,8 @@
 //!   value = c0 + (c4 + t (c1 + t (c2 + t c3)))      cell and t from the voxel's radius
 //! ```
 //!
-//! A row's radii rise and fall by at most a cell from voxel to voxel, so 8 neighbours find their coefficients among
-//! 16 in registers: lanes permute instead of gathering.
+//! A row's radii rise and fall by at most a cell from voxel to voxel, so neighbours find their coefficients among a few
+//! in registers: lanes permute instead of gathering.
 //!
 //! c4 is what c0 lost when it became an f32, so that the sum in brackets, at most some cells in size, is all that is
 //! rounded before the last addition.
@@ -13,8 +13,9 @@
 //! * Accuracy: half an ulp of the value, and some ulps of a cell's side.
 //! * The plain loop is the definition; the wide ones agree with it bit for bit.
 
-use super::plane::{BLOCK, Radii, SCATTERED};
+use super::plane::{BLOCK, REACH, Radii, SCATTERED};
 use crate::math::Kernel;
+use crate::region::{GROUP, Group, RadialTable};
 #[cfg(target_arch = "x86_64")]
 use pulp::Arch;
 
@@ -22,14 +23,16 @@ use pulp::Arch;
 pub(super) fn spread(
     kernel: Kernel,
     at: Radii<'_>,
-    table: [&[f32]; 5],
+    table: &RadialTable,
     least: f32,
     out: &mut [f32],
     doubts: &mut [u8],
 ) {
+    let (table, precise) = table.groups();
     let job = Spread {
         at,
         table,
+        precise,
         least,
         out,
         doubts,
@@ -45,7 +48,9 @@ pub(super) fn spread(
 
 struct Spread<'a> {
     at: Radii<'a>,
-    table: [&'a [f32]; 5],
+    table: &'a [Group],
+    /// Whether c4 counts; it is 0 where it does not.
+    precise: bool,
     least: f32,
     out: &'a mut [f32],
     doubts: &'a mut [u8],
@@ -58,36 +63,28 @@ impl Spread<'_> {
         let radii = self.at.radii.chunks(BLOCK).skip(first);
         let out = self.out.chunks_mut(BLOCK).skip(first);
         for ((radii, out), doubts) in radii.zip(out).zip(&mut self.doubts[first..]) {
-            *doubts = plain(&self.table, self.least, radii, out);
+            *doubts = plain(self.table, self.least, radii, out);
         }
     }
 }
 
 /// One block.
 #[inline(always)]
-fn plain(table: &[&[f32]; 5], least: f32, radii: &[u32], out: &mut [f32]) -> u8 {
+fn plain(table: &[Group], least: f32, radii: &[u32], out: &mut [f32]) -> u8 {
     let mut doubts = 0;
     for n in 0..radii.len() {
         let cell = (radii[n] >> 16) as usize;
+        let (group, cell) = (&table[cell / GROUP], cell % GROUP);
         #[allow(clippy::cast_precision_loss, reason = "16 bits")]
         let t = (radii[n] & 0xffff) as f32 * (1.0 / 65_536.0);
-        let value = t * table[3][cell];
-        let value = t * (table[2][cell] + value);
-        let value = t * (table[1][cell] + value);
-        let value = table[0][cell] + (table[4][cell] + value);
+        let value = t * group[3][cell];
+        let value = t * (group[2][cell] + value);
+        let value = t * (group[1][cell] + value);
+        let value = group[0][cell] + (group[4][cell] + value);
         out[n] = value;
         doubts |= u8::from(!(value.abs() >= least)) << n;
     }
     doubts
-}
-
-/// The coefficients that the lanes of a block choose from; `None` near the end of the table.
-#[inline(always)]
-fn window<const N: usize>(c: &[f32], first: u32) -> Option<&[f32; N]> {
-    match c.get(first as usize..) {
-        Some(rest) => rest.first_chunk::<N>(),
-        None => None,
-    }
 }
 
 // What the wide loops call is `inline(always)` and no closure: a call would leave the function that has the
@@ -96,14 +93,16 @@ fn window<const N: usize>(c: &[f32], first: u32) -> Option<&[f32; N]> {
 #[cfg(target_arch = "x86_64")]
 struct Wide512<'a>(pulp::x86::V4, Spread<'a>);
 
+/// Coefficient `c` of the cells that two groups hold.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn choose_512(
     simd: pulp::x86::V4,
-    c: &[f32; 32],
+    [low, high]: &[Group; 2],
+    c: usize,
     cell: std::arch::x86_64::__m512i,
 ) -> std::arch::x86_64::__m512 {
-    let [low, high]: [std::arch::x86_64::__m512; 2] = pulp::cast(*c);
+    let [low, high]: [std::arch::x86_64::__m512; 2] = [pulp::cast(low[c]), pulp::cast(high[c])];
     simd.avx512f._mm512_permutex2var_ps(low, cell, high)
 }
 
@@ -111,86 +110,117 @@ fn choose_512(
 impl pulp::NullaryFnOnce for Wide512<'_> {
     type Output = ();
 
-    /// Two blocks at a time: 32 coefficients from the lower of their cells on.
     #[inline(always)]
     fn call(self) {
         let Self(simd, job) = self;
-        let f = simd.avx512f;
-        let Spread {
+        if job.precise {
+            run_512::<true>(simd, job);
+        } else {
+            run_512::<false>(simd, job);
+        }
+    }
+}
+
+/// Two blocks at a time, whose cells two groups hold.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
+    let f = simd.avx512f;
+    let Spread {
+        at,
+        table,
+        precise,
+        least,
+        out,
+        doubts,
+    } = job;
+    let (radii, rest) = at.radii.as_chunks::<16>();
+    let (values, _) = out.as_chunks_mut::<16>();
+    let (blocks, _) = at.blocks.as_chunks::<2>();
+    let (marks, _) = doubts.as_chunks_mut::<2>();
+    let part = f._mm512_set1_ps(1.0 / 65_536.0);
+    let low = f._mm512_set1_epi32(0xffff);
+    let limit = f._mm512_set1_ps(least);
+    let all = radii
+        .len()
+        .min(values.len())
+        .min(blocks.len())
+        .min(marks.len());
+    for n in 0..all {
+        let (radii, values) = (&radii[n], &mut values[n]);
+        let [p, q] = blocks[n];
+        let first = p.min(q) / 16;
+        let near = p.max(q) - 16 * first <= 32 - REACH;
+        let (Some(groups), true) = (pair(table, first as usize), near) else {
+            marks[n] = [
+                plain(table, least, &radii[..BLOCK], &mut values[..BLOCK]),
+                plain(table, least, &radii[BLOCK..], &mut values[BLOCK..]),
+            ];
+            continue;
+        };
+        let radius = pulp::cast(*radii);
+        let cell = f._mm512_sub_epi32(
+            f._mm512_srli_epi32::<16>(radius),
+            f._mm512_set1_epi32((16 * first).cast_signed()),
+        );
+        let t = f._mm512_mul_ps(f._mm512_cvtepi32_ps(f._mm512_and_si512(radius, low)), part);
+        let value = f._mm512_mul_ps(t, choose_512(simd, groups, 3, cell));
+        let value = f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, groups, 2, cell), value));
+        let mut value =
+            f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, groups, 1, cell), value));
+        if PRECISE {
+            value = f._mm512_add_ps(choose_512(simd, groups, 4, cell), value);
+        }
+        let value = f._mm512_add_ps(choose_512(simd, groups, 0, cell), value);
+        *values = pulp::cast(value);
+        let mask = f._mm512_cmp_ps_mask::<9>(f._mm512_abs_ps(value), limit);
+        marks[n] = mask.to_le_bytes();
+    }
+    let done = radii.len() * 2;
+    if !rest.is_empty() {
+        Spread {
             at,
             table,
+            precise,
             least,
             out,
             doubts,
-        } = job;
-        let (radii, rest) = at.radii.as_chunks::<16>();
-        let (values, _) = out.as_chunks_mut::<16>();
-        let (blocks, _) = at.blocks.as_chunks::<2>();
-        let (marks, _) = doubts.as_chunks_mut::<2>();
-        let part = f._mm512_set1_ps(1.0 / 65_536.0);
-        let low = f._mm512_set1_epi32(0xffff);
-        let limit = f._mm512_set1_ps(least);
-        for n in 0..radii.len() {
-            let (radii, values) = (&radii[n], &mut values[n]);
-            let [p, q] = blocks[n];
-            let first = p.min(q);
-            let near = p.max(q) - first < 32 - super::plane::REACH;
-            let (Some(a), Some(b), Some(c), Some(d), Some(e), true) = (
-                window::<32>(table[0], first),
-                window::<32>(table[1], first),
-                window::<32>(table[2], first),
-                window::<32>(table[3], first),
-                window::<32>(table[4], first),
-                near,
-            ) else {
-                marks[n] = [
-                    plain(&table, least, &radii[..BLOCK], &mut values[..BLOCK]),
-                    plain(&table, least, &radii[BLOCK..], &mut values[BLOCK..]),
-                ];
-                continue;
-            };
-            let radius = pulp::cast(*radii);
-            let cell = f._mm512_sub_epi32(
-                f._mm512_srli_epi32::<16>(radius),
-                f._mm512_set1_epi32(first.cast_signed()),
-            );
-            let t = f._mm512_mul_ps(f._mm512_cvtepi32_ps(f._mm512_and_si512(radius, low)), part);
-            let value = f._mm512_mul_ps(t, choose_512(simd, d, cell));
-            let value = f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, c, cell), value));
-            let value = f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, b, cell), value));
-            let value = f._mm512_add_ps(choose_512(simd, e, cell), value);
-            let value = f._mm512_add_ps(choose_512(simd, a, cell), value);
-            *values = pulp::cast(value);
-            let mask = f._mm512_cmp_ps_mask::<9>(f._mm512_abs_ps(value), limit);
-            marks[n] = mask.to_le_bytes();
         }
-        let done = radii.len() * 2;
-        if !rest.is_empty() {
-            Spread {
-                at,
-                table,
-                least,
-                out,
-                doubts,
-            }
-            .run(done);
-        }
+        .run(done);
+    }
+}
+
+/// Two groups that follow each other; `None` at the end of the table.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn pair(table: &[Group], first: usize) -> Option<&[Group; 2]> {
+    match table.get(first..) {
+        Some(rest) => rest.first_chunk::<2>(),
+        None => None,
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 struct Wide256<'a>(pulp::x86::V3, Spread<'a>);
 
-/// `upper` has the sign where the cell is in the second half.
+/// Coefficient `c` of the 16 cells from half a group on; `upper` has the sign where the cell is in their second half.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn choose_256(
     simd: pulp::x86::V3,
-    c: &[f32; 16],
+    groups: &[Group; 2],
+    [c, half]: [usize; 2],
     cell: std::arch::x86_64::__m256i,
     upper: std::arch::x86_64::__m256,
 ) -> std::arch::x86_64::__m256 {
-    let [low, high]: [std::arch::x86_64::__m256; 2] = pulp::cast(*c);
+    let (low, _) = groups[0][c].as_chunks::<8>();
+    let (high, _) = groups[1][c].as_chunks::<8>();
+    let [low, high] = if half == 0 {
+        [low[0], low[1]]
+    } else {
+        [low[1], high[0]]
+    };
+    let [low, high]: [std::arch::x86_64::__m256; 2] = [pulp::cast(low), pulp::cast(high)];
     simd.avx._mm256_blendv_ps(
         simd.avx2._mm256_permutevar8x32_ps(low, cell),
         simd.avx2._mm256_permutevar8x32_ps(high, cell),
@@ -202,7 +232,7 @@ fn choose_256(
 impl pulp::NullaryFnOnce for Wide256<'_> {
     type Output = ();
 
-    /// A block at a time: 16 coefficients from its least cell on.
+    /// A block at a time, whose cells are among 16 from half a group on.
     #[inline(always)]
     fn call(self) {
         let Self(simd, job) = self;
@@ -210,6 +240,7 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
         let Spread {
             at,
             table,
+            precise,
             least,
             out,
             doubts,
@@ -223,32 +254,32 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
         for n in 0..radii.len() {
             let (radii, values) = (&radii[n], &mut values[n]);
             let first = at.blocks[n];
-            let (Some(a), Some(b), Some(c), Some(d), Some(e), true) = (
-                window::<16>(table[0], first),
-                window::<16>(table[1], first),
-                window::<16>(table[2], first),
-                window::<16>(table[3], first),
-                window::<16>(table[4], first),
-                first != SCATTERED,
-            ) else {
-                doubts[n] = plain(&table, least, radii, values);
+            let (Some(g), true) = (pair(table, first as usize / 16), first != SCATTERED) else {
+                doubts[n] = plain(table, least, radii, values);
                 continue;
             };
+            let half = first as usize / 8 % 2;
             let radius = pulp::cast(*radii);
             let cell = i._mm256_sub_epi32(
                 i._mm256_srli_epi32::<16>(radius),
-                f._mm256_set1_epi32(first.cast_signed()),
+                f._mm256_set1_epi32((first / 8 * 8).cast_signed()),
             );
             // Cells from 8 on come from the second half: their bit 3, moved to the sign.
             let upper = f._mm256_castsi256_ps(i._mm256_slli_epi32::<28>(cell));
             let t = f._mm256_mul_ps(f._mm256_cvtepi32_ps(i._mm256_and_si256(radius, low)), part);
-            let value = f._mm256_mul_ps(t, choose_256(simd, d, cell, upper));
-            let value =
-                f._mm256_mul_ps(t, f._mm256_add_ps(choose_256(simd, c, cell, upper), value));
-            let value =
-                f._mm256_mul_ps(t, f._mm256_add_ps(choose_256(simd, b, cell, upper), value));
-            let value = f._mm256_add_ps(choose_256(simd, e, cell, upper), value);
-            let value = f._mm256_add_ps(choose_256(simd, a, cell, upper), value);
+            let value = f._mm256_mul_ps(t, choose_256(simd, g, [3, half], cell, upper));
+            let value = f._mm256_mul_ps(
+                t,
+                f._mm256_add_ps(choose_256(simd, g, [2, half], cell, upper), value),
+            );
+            let mut value = f._mm256_mul_ps(
+                t,
+                f._mm256_add_ps(choose_256(simd, g, [1, half], cell, upper), value),
+            );
+            if precise {
+                value = f._mm256_add_ps(choose_256(simd, g, [4, half], cell, upper), value);
+            }
+            let value = f._mm256_add_ps(choose_256(simd, g, [0, half], cell, upper), value);
             *values = pulp::cast(value);
             let size = f._mm256_andnot_ps(sign, value);
             let mask = f._mm256_movemask_ps(f._mm256_cmp_ps::<9>(size, limit));
@@ -266,6 +297,7 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
             Spread {
                 at,
                 table,
+                precise,
                 least,
                 out,
                 doubts,
