@@ -27,6 +27,16 @@ pub(crate) struct Feature {
     after: u32,
 }
 
+/// An arc, or a point whose tangents are not numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    pub(super) start: [f64; 2],
+    pub(super) end: [f64; 2],
+    pub(super) from: [f64; 2],
+    pub(super) to: [f64; 2],
+    pub(super) curvature: f64,
+}
+
 /// Nothing follows, and points beyond are not accounted for.
 const OPEN: u32 = u32::MAX;
 /// Nothing follows, and no point of the half-plane is beyond.
@@ -175,6 +185,19 @@ impl Chain {
         self.features.len()
     }
 
+    /// A feature without its neighbours.
+    pub(super) fn shape(&self, feature: u32) -> Shape {
+        let f = &self.features[feature as usize];
+        let tangent = |t: [f64; 2]| if f.corner == 0.0 { t } else { [f64::NAN; 2] };
+        Shape {
+            start: f.arc.start,
+            end: f.arc.end,
+            from: tangent(f.arc.from),
+            to: tangent(f.arc.to),
+            curvature: f.arc.curvature,
+        }
+    }
+
     /// Unsigned distance from a point to a feature.
     #[inline]
     pub(crate) fn distance(&self, feature: u32, q: [f64; 2]) -> f64 {
@@ -304,6 +327,19 @@ impl Chain {
             runs.push(run);
         }
         (seen == list.len()).then_some(runs)
+    }
+
+    /// A run in parts, without the corners that are nearest to no point of a box (its corners are given): those where
+    /// every point is short of the corner by the arc before it and beyond it by the arc after it, as on the hollow
+    /// side.
+    pub(crate) fn parts<'a>(&self, run: &'a [u32], corners: &[[f64; 2]; 4]) -> Vec<&'a [u32]> {
+        let hollow = |i: &u32| {
+            let f = &self.features[*i as usize];
+            let side = |t: [f64; 2], q: &[f64; 2]| dot(t, minus(*q, f.arc.start));
+            f.corner != 0.0
+                && (corners.iter()).all(|q| side(f.arc.from, q) < 0.0 && side(f.arc.to, q) > 0.0)
+        };
+        run.split(hollow).filter(|part| !part.is_empty()).collect()
     }
 
     /// Whether every point of a box (its corners are given) has one stationary feature of a run at most, found by

@@ -9,6 +9,8 @@
 //! Lengths are in the region's unit. Cells are counted from `first` in units of the smallest.
 
 use super::chain::Chain;
+use super::eights::{Eight, in_eights, nearest};
+use crate::math::Kernel;
 
 /// A quadtree over a rectangle of the half-plane.
 #[derive(Debug, Clone)]
@@ -28,10 +30,10 @@ pub(crate) struct MeridianField {
     /// The four quarters of each node that has any.
     quarters: Vec<[Node; 4]>,
     leaves: Vec<Leaf>,
-    /// The leaves' features.
+    /// The smooth leaves' features.
     pool: Vec<u32>,
-    /// Their distances from the centres of those leaves that keep all of them, 0 for the others.
-    distances: Vec<f32>,
+    /// Those of the others.
+    eights: Vec<Eight>,
     /// Features looked at so far.
     work: usize,
 }
@@ -47,10 +49,11 @@ enum Node {
 /// A cell that is not divided.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leaf {
+    /// Its part of the pool, or of the eights.
     start: u32,
     len: u32,
-    /// Whether the features kept are one of each of its smooth runs, from which walking finds that run's nearest;
-    /// else they are all that may be nearest, the one nearest to the centre first.
+    /// Whether the features kept are one of each of its smooth runs, from which walking finds that run's nearest, in
+    /// the pool; else they are all that may be nearest, the one nearest to the centre first, in eights.
     pub(crate) smooth: bool,
     centre: [f64; 2],
 }
@@ -73,6 +76,8 @@ const LEVELS_OF_RUNS: [u32; MOST_RUNS] = [u32::MAX, 3, 2, 1];
 /// The most features looked at, over all cells: a fraction of a second, and a bound on the memory. A boundary that takes more
 /// has detail finer than the cells almost everywhere.
 const MOST_WORK: usize = 20_000_000;
+/// The most eights of features: some 150 MB.
+const MOST_EIGHTS: usize = 1 << 18;
 /// The most cells along a side of the rectangle.
 pub(crate) const MOST_CELLS: f64 = 32_768.0;
 
@@ -108,12 +113,12 @@ impl MeridianField {
             quarters: Vec::new(),
             leaves: Vec::new(),
             pool: Vec::new(),
-            distances: Vec::new(),
+            eights: Vec::new(),
             work: 0,
         };
         let all: Vec<u32> = (0_u32..).take(field.chain.len()).collect();
         field.root = field.node([0, 0], field.levels, &all);
-        (field.work <= MOST_WORK).then_some(field)
+        (field.work <= MOST_WORK && field.eights.len() <= MOST_EIGHTS).then_some(field)
     }
 
     /// The boundary's features.
@@ -126,7 +131,7 @@ impl MeridianField {
         size_of_val(&*self.quarters)
             + size_of_val(&*self.leaves)
             + size_of_val(&*self.pool)
-            + size_of_val(&*self.distances)
+            + size_of_val(&*self.eights)
             + self.chain.bytes()
     }
 
@@ -140,9 +145,13 @@ impl MeridianField {
         (self.size[0] as usize, self.first[0])
     }
 
-    /// The features kept of a leaf.
+    /// The features kept of a smooth leaf, none of another.
     pub(crate) fn features(&self, leaf: &Leaf) -> &[u32] {
-        &self.pool[leaf.start as usize..(leaf.start + leaf.len) as usize]
+        if leaf.smooth {
+            &self.pool[leaf.start as usize..(leaf.start + leaf.len) as usize]
+        } else {
+            &[]
+        }
     }
 
     /// A leaf by its number.
@@ -164,7 +173,7 @@ impl MeridianField {
             return Node::Empty;
         }
         self.work += list.len();
-        if self.work > MOST_WORK {
+        if self.work > MOST_WORK || self.eights.len() > MOST_EIGHTS {
             return Node::Empty;
         }
         let side = f64::from(1_u32 << level) * self.cell;
@@ -191,13 +200,20 @@ impl MeridianField {
             [low[0], low[1] + side],
             [low[0] + side, low[1] + side],
         ];
-        if let Some(runs) = self.chain.runs(&kept)
-            && runs.len() <= MOST_RUNS
-            && level <= LEVELS_OF_RUNS[runs.len() - 1]
-            && runs.iter().all(|run| self.chain.is_smooth(run, &corners))
-        {
-            let middles: Vec<u32> = runs.iter().map(|run| run[run.len() / 2]).collect();
-            return self.add_leaf(&middles, None, centre);
+        if let Some(runs) = self.chain.runs(&kept) {
+            let parts = runs.iter().flat_map(|run| self.chain.parts(run, &corners));
+            let parts: Vec<&[u32]> = parts.collect();
+            if (1..=MOST_RUNS).contains(&parts.len())
+                && level <= LEVELS_OF_RUNS[parts.len() - 1]
+                && parts
+                    .iter()
+                    .all(|part| self.chain.is_smooth(part, &corners))
+            {
+                let middles: Vec<u32> = parts.iter().map(|part| part[part.len() / 2]).collect();
+                let start = self.pool.len();
+                self.pool.extend(middles);
+                return self.add_leaf([start, self.pool.len()], true, centre);
+            }
         }
         if level == 0 {
             let mut sorted: Vec<(u32, f64)> = (list.iter().copied())
@@ -205,8 +221,11 @@ impl MeridianField {
                 .filter(|(_, d)| *d <= limit)
                 .collect();
             sorted.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-            let (kept, distances): (Vec<u32>, Vec<f64>) = sorted.into_iter().unzip();
-            return self.add_leaf(&kept, Some(&distances), centre);
+            let shapes = sorted.iter().map(|(i, d)| (self.chain.shape(*i), *d));
+            let shapes: Vec<_> = shapes.collect();
+            let start = self.eights.len();
+            self.eights.extend(in_eights(&shapes));
+            return self.add_leaf([start, self.eights.len()], false, centre);
         }
         let half = 1 << (level - 1);
         let quarters = [0, 1, 2, 3].map(|q: u32| {
@@ -217,48 +236,31 @@ impl MeridianField {
         Node::Quarters(u32::try_from(self.quarters.len() - 1).unwrap_or(u32::MAX))
     }
 
-    /// Adds a leaf; with `distances` of all features that may be nearest, else of one of each smooth run.
-    fn add_leaf(&mut self, list: &[u32], distances: Option<&[f64]>, centre: [f64; 2]) -> Node {
+    /// Adds a leaf with its part of the pool or of the eights.
+    fn add_leaf(&mut self, [start, end]: [usize; 2], smooth: bool, centre: [f64; 2]) -> Node {
         let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-        let leaf = Leaf {
-            start: number(self.pool.len()),
-            len: number(list.len()),
-            smooth: distances.is_none(),
+        self.leaves.push(Leaf {
+            start: number(start),
+            len: number(end - start),
+            smooth,
             centre,
-        };
-        self.pool.extend_from_slice(list);
-        #[allow(clippy::cast_possible_truncation, reason = "a hair less is taken off")]
-        let lower = |d: &f64| (d * (1.0 - 1e-6)) as f32;
-        match distances {
-            Some(distances) => self.distances.extend(distances.iter().map(lower)),
-            None => self.distances.resize(self.pool.len(), 0.0),
-        }
-        self.leaves.push(leaf);
+        });
         Node::Leaf(number(self.leaves.len() - 1))
     }
 
     /// The unsigned distance of a point of a leaf.
-    pub(crate) fn distance(&self, leaf: &Leaf, q: [f64; 2]) -> f64 {
-        let features = self.features(leaf);
+    pub(crate) fn distance(&self, kernel: Kernel, leaf: &Leaf, q: [f64; 2]) -> f64 {
         if leaf.smooth {
-            let sizes = features.iter().map(|&i| {
+            let sizes = self.features(leaf).iter().map(|&i| {
                 let local = self.chain.local(self.chain.walk(i, q), q);
                 local.value.abs()
             });
             return sizes.fold(f64::INFINITY, f64::min);
         }
         let [x, z] = [q[0] - leaf.centre[0], q[1] - leaf.centre[1]];
-        // No feature is nearer to the point than to the centre by more than this.
         let away = (x * x + z * z).sqrt() * (1.0 + 1e-9);
-        let mut nearest = f64::INFINITY;
-        let distances = &self.distances[leaf.start as usize..];
-        for (&i, &from_centre) in features.iter().zip(distances) {
-            if f64::from(from_centre) - away > nearest {
-                break;
-            }
-            nearest = nearest.min(self.chain.distance(i, q));
-        }
-        nearest
+        let eights = &self.eights[leaf.start as usize..(leaf.start + leaf.len) as usize];
+        nearest(kernel, eights, q, away)
     }
 
     /// Calls `each(first, last, leaf)` for the leaves at height `z`, in the order of r; `first..last` are

@@ -18,6 +18,7 @@ mod chain;
 mod crossings;
 mod curve;
 mod distance;
+mod eights;
 mod error;
 mod field;
 mod moments;

@@ -18,6 +18,7 @@
 
 use super::chain::Local;
 use super::field::{MOST_RUNS, MeridianField};
+use crate::math::Kernel;
 
 /// Cells whose coefficients lie together.
 pub(crate) const GROUP: usize = 16;
@@ -37,6 +38,7 @@ pub(crate) struct RadialTable {
     ridges: Vec<[u32; 2]>,
     /// Cubics of the stretches that may be nearest in cells with a ridge.
     cubics: Vec<[f64; 4]>,
+    kernel: Kernel,
     height: f64,
     scale: f64,
 }
@@ -55,7 +57,14 @@ const BENT: f64 = 0.25;
 
 impl RadialTable {
     /// Tabulates height `z` of a field whose unit is `scale` scene units, within `tolerance` region units.
-    pub(crate) fn fill(&mut self, field: &MeridianField, z: f64, scale: f64, tolerance: f64) {
+    pub(crate) fn fill(
+        &mut self,
+        kernel: Kernel,
+        field: &MeridianField,
+        z: f64,
+        scale: f64,
+        tolerance: f64,
+    ) {
         let (columns, first) = field.columns();
         self.groups.clear();
         self.groups
@@ -65,6 +74,7 @@ impl RadialTable {
         self.ridges.clear();
         self.ridges.resize(columns, [0; 2]);
         self.cubics.clear();
+        self.kernel = kernel;
         self.height = z;
         self.scale = scale;
         let cell = field.cell();
@@ -228,7 +238,7 @@ impl RadialTable {
             return sizes.fold(f64::INFINITY, f64::min);
         }
         let leaf = field.leaf(self.leaves[cell]);
-        field.distance(leaf, [r, self.height]) * self.scale
+        field.distance(self.kernel, leaf, [r, self.height]) * self.scale
     }
 }
 
@@ -504,7 +514,7 @@ mod tests {
                 for _ in 0..60 {
                     let z = extent.z[0] + (extent.z[1] - extent.z[0]) * number();
                     let began = std::time::Instant::now();
-                    table.fill(&field, z, 1.0, 3.5e-5 * cell);
+                    table.fill(Kernel::default(), &field, z, 1.0, 3.5e-5 * cell);
                     time += began.elapsed();
                     for k in 0..columns {
                         let t = number();

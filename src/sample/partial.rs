@@ -165,8 +165,13 @@ impl PartialSampler {
         let frame = body.frame();
         let height = frame.to_local_exact(grid.centre(0, 0, known.k))[2].f64();
         let (scale, tolerance) = (frame.scale(), self.tolerance);
-        scratch.swept.fill(&self.swept, height, scale, tolerance);
-        scratch.edges.fill(&self.edges, height, scale, tolerance);
+        let kernel = writing.kernel;
+        scratch
+            .swept
+            .fill(kernel, &self.swept, height, scale, tolerance);
+        scratch
+            .edges
+            .fill(kernel, &self.edges, height, scale, tolerance);
         self.settle(body, height, &mut scratch.edges, &mut scratch.crossed);
         let PartialScratch {
             swept,

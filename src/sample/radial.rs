@@ -137,7 +137,7 @@ impl RadialSampler {
         let z = frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
         scratch
             .table
-            .fill(&self.field, z, frame.scale(), self.tolerance);
+            .fill(kernel, &self.field, z, frame.scale(), self.tolerance);
         scratch.close.clear();
         let (columns, padded) = self.plane.stored();
         let rows = self.plane.len();
