@@ -109,6 +109,45 @@ axis = { origin = [0, 0, 1] }
     ),
 ];
 
+/// Turns by less than 360 degrees: angle and start, with caps along the grid and not, and the halves of the plane that
+/// a wedge may fill.
+const TURNS: &[(f64, f64)] = &[
+    (90.0, 0.0),
+    (270.0, 0.0),
+    (180.0, 17.0),
+    (30.0, 200.0),
+    (359.0, 100.0),
+    (270.0, 45.5),
+    (180.0, 90.0),
+    (1.0, 45.0),
+];
+
+/// The one solid of each scene in less than a full turn.
+fn wedges() -> Vec<(String, String)> {
+    let shell = (
+        "shell",
+        // A wall thinner than the voxels, away from the axis.
+        "[profiles.shell]
+curves = [{ kind = 'polyline', points = [[1, 0], [1.004, 0], [1.304, 1.5], [1.3, 1.5], [1, 0]] }]
+[[solid]]
+kind = 'revolve'
+profile = 'shell'
+axis = { origin = [0.1, 0.2, -0.3], direction = [0, 0, -1], x = [0.6, 0.8, 0] }
+",
+    );
+    let single = |text: &str| text.matches("[[solid]]").count() == 1;
+    let mut found = Vec::new();
+    for (name, text) in SCENES.iter().chain([&shell]).filter(|s| single(s.1)) {
+        for (angle, start) in TURNS {
+            found.push((
+                format!("{name} {angle} from {start}"),
+                format!("{text}angle = {angle:?}\nstart = {start:?}\n"),
+            ));
+        }
+    }
+    found
+}
+
 fn scene(text: &str) -> Scene {
     Scene::parse(&format!("schema = 1\n{text}")).expect("a scene")
 }
@@ -178,7 +217,9 @@ fn compare(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
                     inside,
                     "{name}: sign {found} at voxel ({i}, {j}, {k})"
                 );
-                let ulp = f64::from(f32::EPSILON) * exact.abs();
+                #[allow(clippy::cast_possible_truncation, reason = "as stored")]
+                let size = exact.abs() as f32;
+                let ulp = f64::from(size.next_up()) - f64::from(size);
                 let share = (found - exact).abs() / (2.0 * ulp).max(1e-4 * spacing);
                 assert!(
                     share <= 1.0,
@@ -201,6 +242,53 @@ fn every_voxel_is_within_the_bound() {
             .map(|g| compare(name, &scene, g))
             .fold(0.0, f64::max);
         eprintln!("{name}: worst error {worst:.3} of the bound");
+    }
+}
+
+#[test]
+fn every_voxel_of_a_wedge_is_within_the_bound() {
+    let mut all = 0.0_f64;
+    for (n, (name, text)) in wedges().iter().enumerate() {
+        let scene = scene(text);
+        let grids = grids(&scene);
+        // Two of the grids for each, so that every turn and every solid meets all of them.
+        let worst = [n + n / TURNS.len(), n + n / TURNS.len() + 3]
+            .map(|g| compare(name, &scene, &grids[g % grids.len()]));
+        eprintln!("{name}: worst error {worst:.3?} of the bound");
+        all = worst.iter().fold(all, |m, w| m.max(*w));
+    }
+    eprintln!("worst error {all:.3} of the bound");
+}
+
+#[test]
+fn wedges_of_any_size_and_place_are_within_the_bound() {
+    for (n, (name, text)) in wedges().iter().enumerate() {
+        let (scale, place) = [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)][n % 3];
+        let moved = format!(
+            "{text}\nplace = [{{ scale = {scale} }}, {{ translate = [{place}, {place}, {place}] }}]\n"
+        );
+        let scene = scene(&moved);
+        let grid = grids(&scene)[n % 5];
+        compare(&format!("{name} x {scale} + {place}"), &scene, &grid);
+    }
+}
+
+#[test]
+fn flat_voxels_are_within_the_bound() {
+    for (name, text) in wedges().iter().step_by(5) {
+        let scene = scene(text);
+        let b = scene.bounds();
+        let side = b.longest_side();
+        for (dims, flat) in [
+            ([23, 61, 7], DVec3::new(1.0, 0.4, 0.1)),
+            ([31, 29, 41], DVec3::new(8.0, 1.0, 0.5)),
+        ] {
+            let spacing = 0.03 * side * flat;
+            let extent = spacing * DVec3::from_array(dims.map(|d| d as f64));
+            let origin = 0.5 * (b.min + b.max) - 0.5 * extent;
+            let grid = GridSpec::new(dims, origin, spacing).expect("a grid");
+            compare(name, &scene, &grid);
+        }
     }
 }
 
@@ -231,8 +319,11 @@ fn every_way_gives_the_same_bytes() {
         SimdLevel::Avx512,
         SimdLevel::Auto,
     ];
-    for (name, text) in SCENES {
-        let scene = scene(text);
+    let scenes = SCENES
+        .iter()
+        .map(|(n, t)| ((*n).to_owned(), (*t).to_owned()));
+    for (name, text) in scenes.chain(wedges().into_iter().step_by(3)) {
+        let scene = scene(&text);
         for grid in grids(&scene) {
             let n = usize::try_from(grid.voxel_count()).expect("small");
             for band in [None, Some(2.5 * grid.spacing().max_element())] {
@@ -264,8 +355,11 @@ fn every_way_gives_the_same_bytes() {
 
 #[test]
 fn a_band_clamps_and_changes_nothing_else() {
-    for (name, text) in SCENES {
-        let scene = scene(text);
+    let scenes = SCENES
+        .iter()
+        .map(|(n, t)| ((*n).to_owned(), (*t).to_owned()));
+    for (name, text) in scenes.chain(wedges().into_iter().step_by(3)) {
+        let scene = scene(&text);
         let grid = grids(&scene)[0];
         let band = 3.0 * grid.spacing().max_element();
         let n = usize::try_from(grid.voxel_count()).expect("small");

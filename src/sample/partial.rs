@@ -347,7 +347,7 @@ impl PartialSampler {
         for g in (0..groups).filter(|g| scratch.doubts[*g]) {
             for i in g * GROUP..((g + 1) * GROUP).min(nx) {
                 if !(out[i].abs() >= given.least) {
-                    out[i] = self.mended(layer, [i, j], row, distances[i]);
+                    out[i] = self.mended(layer, [i, j], row, distances[i], out[i]);
                 }
             }
         }
@@ -401,11 +401,35 @@ impl PartialSampler {
         );
     }
 
-    /// The value of a voxel that the tables do not tell, from its distance to the swept surface.
-    fn mended(&self, layer: &Layer<'_>, [i, j]: [usize; 2], row: CapRow, swept: f32) -> f32 {
+    /// The value of a voxel whose value from the tables is `found`: not a number, or too near to 0.
+    fn mended(
+        &self,
+        layer: &Layer<'_>,
+        [i, j]: [usize; 2],
+        row: CapRow,
+        swept: f32,
+        found: f32,
+    ) -> f32 {
         let (grid, known) = (layer.grid, layer.known);
         let inside = bits::get(known.inside, j * grid.dims()[0] + i);
-        let x = self.caps.x()[i];
+        let value = if found.is_nan() {
+            let x = self.caps.x()[i];
+            combined(row, x, swept, self.edge(layer, row, x), inside)
+        } else {
+            0.0
+        };
+        let band = layer.writing.band;
+        let distance = if value >= self.near {
+            f64::from(value)
+        } else {
+            let point = grid.centre(i, j, known.k);
+            layer.body.distance(point, inside, band)
+        };
+        stored(signed(distance, inside).clamp(-band, band))
+    }
+
+    /// Distance to the section in the cap's plane, 0 in it, at a place where the table has none.
+    fn edge(&self, layer: &Layer<'_>, row: CapRow, x: f64) -> f32 {
         let [place, _] = row.at(x);
         let (columns, first) = self.edges.columns();
         #[allow(
@@ -418,21 +442,10 @@ impl PartialSampler {
             ((place / PLACES) as usize).min(columns - 1),
             (place / PLACES + first as f64) * self.edges.cell(),
         );
-        let edge = if layer.crossed[column] && layer.body.section_holds([along, layer.height]) {
-            0.0
-        } else {
-            layer.edges.mended(&self.edges, column, along)
-        };
-        let value = combined(row, x, swept, stored(edge), inside);
-        let band = layer.writing.band;
-        let distance = if value >= self.near {
-            f64::from(value)
-        } else {
-            layer
-                .body
-                .distance(grid.centre(i, j, known.k), inside, band)
-        };
-        stored(signed(distance, inside).clamp(-band, band))
+        if layer.crossed[column] && layer.body.section_holds([along, layer.height]) {
+            return 0.0;
+        }
+        stored(layer.edges.mended(&self.edges, column, along))
     }
 }
 
