@@ -374,7 +374,7 @@ fn loops(profile: &ProfileModel) -> Vec<&[CurveModel]> {
         .collect()
 }
 
-fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
+pub(super) fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
     let loops: Vec<ProfileLoop> = loops(profile)
         .into_iter()
         .map(|l| l.iter().map(curve).collect())
@@ -460,7 +460,11 @@ pub(super) fn curve(curve: &CurveModel) -> ProfileCurve {
 }
 
 /// A region's error at its place in the scene.
-fn placed(model: &SceneModel, profile: &ProfileModel, error: &RegionError) -> SceneError {
+pub(super) fn placed(
+    model: &SceneModel,
+    profile: &ProfileModel,
+    error: &RegionError,
+) -> SceneError {
     let loops = loops(profile);
     let curve_at = |l: usize, c: usize| loops.get(l).and_then(|curves| curves.get(c));
     let name = |l: usize, c: usize| curve_at(l, c).map_or_else(String::new, |c| c.path.clone());

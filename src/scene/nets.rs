@@ -1,6 +1,6 @@
 //! From the data of a volume to its NURBS.
 
-use super::build::{curve, frame};
+use super::build::{curve, frame, placed, region};
 use super::error::Place;
 use super::limits::MAX_CELLS;
 use super::model::{
@@ -18,7 +18,9 @@ use crate::math::{Dd, Real};
 use crate::nurbs::{
     KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError,
 };
-use crate::region::{Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, beziers};
+use crate::region::{
+    Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, RegionError, beziers,
+};
 use crate::solid::{Body, Field, Part, Patches, Turn};
 use std::sync::Arc;
 
@@ -40,7 +42,7 @@ pub(super) fn part(
             turn,
             union,
         } => {
-            let chain = maker.chain(&model.profiles[*profile].1)?;
+            let chain = maker.chain(&model.profiles[*profile].1, *union)?;
             if let Some(back) = chain.reversal {
                 if !*union {
                     let hint = "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
@@ -93,7 +95,7 @@ pub(super) fn revolved(
     turn: TurnModel,
 ) -> Result<Vec<NurbsVolume>, Error> {
     let maker = Maker { model, solid };
-    let chain = maker.chain(&model.profiles[profile].1)?;
+    let chain = maker.chain(&model.profiles[profile].1, false)?;
     if let Some(back) = chain.reversal {
         return Err(maker.runs_back(back, "`mesh` writes the boundary of every solid"));
     }
@@ -244,8 +246,10 @@ impl Maker<'_> {
         })
     }
 
-    /// The chain of a profile, in pieces.
-    fn chain(&self, profile: &ProfileModel) -> Result<Chain, Error> {
+    /// The chain of a profile, in pieces, its gaps closed.
+    ///
+    /// * `union`: its discs are asked for, which may have an area where the profile has none.
+    fn chain(&self, profile: &ProfileModel, union: bool) -> Result<Chain, Error> {
         let wanted = "a profile with boundary = \"to-axis\" and one chain, `curves`";
         let found = match (&profile.curves, profile.boundary) {
             (Some(_), model::Boundary::ToAxis) if profile.loops.is_empty() => None,
@@ -254,6 +258,14 @@ impl Maker<'_> {
         };
         if let Some(found) = found {
             return Err(self.fault(".profile", found.to_owned(), wanted, None));
+        }
+        // What is refused when it is turned as a profile is refused here.
+        match region(profile) {
+            Ok(_) => {}
+            Err(RegionError::NoArea) if union => {}
+            Err(RegionError::NoArea) => return Err(self.encloses_nothing()),
+            Err(RegionError::Tangle { .. }) => {}
+            Err(error) => return Err(placed(self.model, profile, &error).into()),
         }
         let mut pieces = Vec::new();
         for (index, one) in profile.curves.iter().flatten().enumerate() {
@@ -266,6 +278,7 @@ impl Maker<'_> {
                 split_at_extrema(index, bezier.points, &mut pieces);
             }
         }
+        let mut pieces = without_gaps(pieces);
         let rises: Vec<f64> = pieces.iter().map(Piece::rise).collect();
         let first = rises
             .iter()
@@ -278,6 +291,16 @@ impl Maker<'_> {
             pieces = pieces.into_iter().map(Piece::reversed).collect();
         }
         Ok(Chain { pieces, reversal })
+    }
+
+    fn encloses_nothing(&self) -> Error {
+        let found = "a chain that encloses no volume with the axis".to_owned();
+        self.fault(
+            ".profile",
+            found,
+            "a chain along which z rises, or falls, off the axis",
+            None,
+        )
     }
 
     fn runs_back(&self, piece: usize, hint: &str) -> Error {
@@ -313,6 +336,9 @@ impl Maker<'_> {
                 _ => runs.push(vec![piece]),
             }
             broken = false;
+        }
+        if runs.is_empty() {
+            return Err(self.encloses_nothing());
         }
         let radii: Vec<[f64; 2]> = runs
             .iter()
@@ -416,6 +442,54 @@ fn fold_depth(volume: &NurbsVolume) -> f64 {
 fn volume_of(patch: &PatchModel) -> Result<NurbsVolume, NurbsError> {
     let [u, v, w] = [0, 1, 2].map(|k| KnotVector::new(patch.degrees[k], patch.knots[k].clone()));
     NurbsVolume::new([u?, v?, w?], patch.points.clone(), patch.weights.clone())
+}
+
+/// Pieces that meet end to end: a gap, which is at most 1e-9 of the profile's size, is closed by a
+/// segment.
+///
+/// A segment too low to have faces of its own, or one that runs back, is left out: there the next piece
+/// begins at the height at which the last one ends.
+fn without_gaps(pieces: Vec<Piece>) -> Vec<Piece> {
+    /// Share of the size below which two faces are nearly one.
+    const THIN: f64 = 1e-11;
+    let ends = || pieces.iter().flat_map(Piece::ends);
+    let size = (0..2).fold(0.0_f64, |m, k| {
+        let low = ends().fold(f64::INFINITY, |m, p| m.min(p[k]));
+        let high = ends().fold(f64::NEG_INFINITY, |m, p| m.max(p[k]));
+        m.max(high - low)
+    });
+    let direction = match (pieces.first(), pieces.last()) {
+        (Some(first), Some(last)) => last.ends()[1][1] - first.ends()[0][1],
+        _ => 0.0,
+    };
+    let mut closed: Vec<Piece> = Vec::with_capacity(pieces.len());
+    for mut piece in pieces {
+        for end in [0, piece.points.len() - 1] {
+            // Below the axis by a rounding counts as on it.
+            let r = &mut piece.points[end][0];
+            *r = if *r < Dd::ZERO { Dd::ZERO } else { *r };
+        }
+        if let Some(last) = closed.last() {
+            let at = |[r, z, w]: HomogeneousPoint| [r / w, z / w];
+            let (from, to) = (at(last.points[last.points.len() - 1]), at(piece.points[0]));
+            let [across, along] = [0, 1].map(|k| (to[k] - from[k]).f64());
+            if along.abs() > THIN * size && along * direction > 0.0 {
+                closed.push(Piece {
+                    // Of no curve.
+                    curve: usize::MAX,
+                    points: [from, to].map(|[r, z]| [r, z, Dd::ONE]).to_vec(),
+                });
+            } else {
+                let [r, z, w] = &mut piece.points[0];
+                *z = from[1] * *w;
+                if across.abs() <= THIN * size {
+                    *r = from[0] * *w;
+                }
+            }
+        }
+        closed.push(piece);
+    }
+    closed
 }
 
 /// Cuts a piece where z turns.

@@ -1,0 +1,128 @@
+//! Volumes that were once answered wrongly, or refused or accepted without a word, one test each.
+
+use glam::DVec3;
+use std::f64::consts::PI;
+use voxlathe::Scene;
+
+fn parse(text: &str) -> Result<Scene, String> {
+    Scene::parse(&format!("schema = 1\n{text}")).map_err(|e| e.to_string())
+}
+
+fn scene(text: &str) -> Scene {
+    parse(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+fn refused(text: &str) -> String {
+    match parse(text) {
+        Ok(_) => panic!("accepted: {text}"),
+        Err(error) => error,
+    }
+}
+
+/// The volume of a chain, and what the same profile is when it is turned.
+fn pair(curves: &str, construct: &str) -> [Result<Scene, String>; 2] {
+    let profile = format!("[profiles.p]\nboundary = 'to-axis'\ncurves = [{curves}]");
+    [
+        format!("kind = 'volume'\nconstruct = '{construct}'"),
+        "kind = 'revolve'".to_owned(),
+    ]
+    .map(|kind| parse(&format!("{profile}\n[[solid]]\n{kind}\nprofile = 'p'")))
+}
+
+fn polyline(points: &str) -> String {
+    format!("{{ kind = 'polyline', points = [{points}] }}")
+}
+
+/// A patch of degree 1 between two corners.
+fn block(low: [f64; 3], high: [f64; 3]) -> String {
+    let corner = |n: usize| [0, 1, 2].map(|k| if n >> k & 1 == 0 { low[k] } else { high[k] });
+    let points: Vec<[f64; 3]> = (0..8).map(corner).collect();
+    format!(
+        "{{ degrees = [1, 1, 1], knots = [[0, 0, 1, 1], [0, 0, 1, 1], [0, 0, 1, 1]], points = {points:?} }}"
+    )
+}
+
+fn patches(list: &[String]) -> String {
+    format!(
+        "[[solid]]\nkind = 'volume'\npatches = [{}]",
+        list.join(", ")
+    )
+}
+
+fn distance(scene: &Scene, p: [f64; 3]) -> f64 {
+    scene.assembly().signed_distance(p.into())
+}
+
+#[test]
+fn a_chain_with_a_gap_is_refused_as_a_profile_is() {
+    let apart = [polyline("[1, 0], [1, 1]"), polyline("[1, 2], [1, 3]")].join(", ");
+    let below = polyline("[-1, 0], [1, 2]");
+    for construct in ["curve-disc", "curve-ruled"] {
+        for (curves, said) in [
+            (
+                &apart,
+                "a gap of 1e0 between the end of profiles.p.curves[0] at (r, z) = (1, 1) and the start of profiles.p.curves[1]",
+            ),
+            (&below, "r = -1e0 at parameter"),
+        ] {
+            let [volume, turned] = pair(curves, construct);
+            let error = volume
+                .err()
+                .unwrap_or_else(|| panic!("{construct} {curves}"));
+            assert!(error.contains(said), "{error}");
+            assert_eq!(
+                error,
+                turned
+                    .expect_err("refused too")
+                    .replace("revolve", "volume")
+            );
+        }
+    }
+}
+
+#[test]
+fn a_gap_that_a_profile_closes_is_closed_in_its_volume() {
+    for off in [5e-10, -5e-10, 1e-16] {
+        for radius in [0.0, 4e-10] {
+            let curves = [
+                polyline("[1, 0], [1, 1]"),
+                polyline(&format!("[{}, {}], [1, 2]", 1.0 + radius, 1.0 + off)),
+            ];
+            for construct in ["curve-disc", "curve-ruled"] {
+                let [volume, turned] =
+                    pair(&curves.join(", "), construct).map(|s| s.expect("a solid"));
+                for z in [1.2, 1.0, 1.0 + 0.5 * off, 0.7] {
+                    let p = [0.0, 0.0, z];
+                    let (a, b) = (distance(&volume, p), distance(&turned, p));
+                    assert!(
+                        (a - b).abs() < 2e-9 && b < -0.5,
+                        "{off} {radius} {construct} {z}: {a} {b}"
+                    );
+                }
+                let (a, b) = [&volume, &turned]
+                    .map(|s| s.exact_volume().expect("one solid"))
+                    .into();
+                assert!((a - b).abs() < 1e-8, "{a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_empty_is_named() {
+    for curves in [polyline("[1, 0], [2, 0]"), polyline("[0, 0], [0, 2]")] {
+        for fill in ["", "fill = 'union'"] {
+            for construct in ["curve-disc", "curve-ruled"] {
+                let error = refused(&format!(
+                    "[profiles.p]\nboundary = 'to-axis'\ncurves = [{curves}]\n[[solid]]\nkind = 'volume'\nconstruct = '{construct}'\nprofile = 'p'\n{fill}"
+                ));
+                assert!(
+                    !error.contains("NaN") && error.contains("profile"),
+                    "{error}"
+                );
+                assert!(error.contains("encloses no"), "{error}");
+            }
+        }
+    }
+}
+
