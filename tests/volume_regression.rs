@@ -109,6 +109,81 @@ fn a_gap_that_a_profile_closes_is_closed_in_its_volume() {
 }
 
 #[test]
+fn blocks_that_overlap_keep_the_faces_they_share_on_one_side() {
+    let both = scene(&patches(&[
+        block([0.0; 3], [1.0; 3]),
+        block([0.0; 3], [2.0, 1.0, 1.0]),
+    ]));
+    assert_eq!(both.bounds().min.to_array(), [0.0; 3]);
+    assert_eq!(both.bounds().max.to_array(), [2.0, 1.0, 1.0]);
+    assert!(both.assembly().contains(DVec3::splat(0.5)));
+    assert_eq!(distance(&both, [0.25, 0.5, 0.5]), -0.25);
+    let twice = scene(&patches(&[
+        block([0.0; 3], [1.0; 3]),
+        block([0.0; 3], [1.0; 3]),
+    ]));
+    assert_eq!(distance(&twice, [0.25, 0.5, 0.5]), -0.25);
+    assert_eq!(distance(&twice, [-0.25, 0.5, 0.5]), 0.25);
+    assert!(twice.warnings()[0].contains("patches 0 and 1 overlap"));
+}
+
+#[test]
+fn cells_and_faces_agree_on_what_is_one_face() {
+    // Neighbours a rounding apart, far out.
+    let x = 1_000_000.3_f64;
+    let far = scene(&patches(&[
+        block([1_000_000.0, 0.0, 0.0], [x, 1.0, 1.0]),
+        block([x.next_up(), 0.0, 0.0], [1_000_001.0, 1.0, 1.0]),
+    ]));
+    assert!((distance(&far, [x, 0.5, 0.5]) + 0.3).abs() < 1e-9);
+    // A gap of many roundings.
+    let near = scene(&patches(&[
+        block([0.0; 3], [1.0; 3]),
+        block([1.0 + 5e-13, 0.0, 0.0], [2.0, 1.0, 1.0]),
+    ]));
+    let middle = [1.0 + 2.5e-13, 0.5, 0.5];
+    assert!(!near.assembly().contains(middle.into()));
+    assert!(distance(&near, middle) < 1e-12);
+    assert!((distance(&near, [0.9, 0.5, 0.5]) + 0.1).abs() < 1e-12);
+}
+
+#[test]
+fn a_long_patch_is_made_ready_in_time_that_grows_with_its_length() {
+    let count = 20_000;
+    let knots = (0..=count).map(f64::from);
+    let knots: Vec<f64> = std::iter::once(0.0)
+        .chain(knots)
+        .chain([f64::from(count)])
+        .collect();
+    let line = voxlathe::nurbs::KnotVector::bezier(1).expect("valid");
+    let mut points = Vec::new();
+    for n in 0..4 {
+        for i in 0..=count {
+            points.push([f64::from(i), f64::from(n & 1), f64::from(n >> 1)]);
+        }
+    }
+    let weights = vec![1.0; points.len()];
+    let along = voxlathe::nurbs::KnotVector::new(1, knots).expect("valid");
+    let volume = voxlathe::nurbs::NurbsVolume::new([along, line.clone(), line], points, weights)
+        .expect("valid");
+    let start = std::time::Instant::now();
+    let faces = voxlathe::patch::FaceSet::new(std::slice::from_ref(&volume)).expect("faces");
+    eprintln!("faces in {:?}", start.elapsed());
+    let start = std::time::Instant::now();
+    let cells = voxlathe::patch::Cells::new(std::slice::from_ref(&volume)).expect("cells");
+    eprintln!("cells in {:?}", start.elapsed());
+    let start = std::time::Instant::now();
+    let frame =
+        voxlathe::math::Similarity::from_axis(DVec3::ZERO, DVec3::Z, DVec3::X).expect("a frame");
+    let solid = voxlathe::solid::Patches::new(&frame, vec![volume], Vec::new()).expect("a solid");
+    eprintln!("all in {:?}", start.elapsed());
+    assert!(start.elapsed().as_secs() < 30, "quadratic");
+    drop(solid);
+    assert_eq!(faces.faces().len(), 4 * 20_000 + 2);
+    assert_eq!(cells.len(), 20_000);
+}
+
+#[test]
 fn what_is_empty_is_named() {
     for curves in [polyline("[1, 0], [2, 0]"), polyline("[0, 0], [0, 2]")] {
         for fill in ["", "fill = 'union'"] {

@@ -213,7 +213,7 @@ impl Frame {
         Ok(Self {
             centre,
             inverse_unit,
-            tolerance: 4.0 * f64::EPSILON * (2.0 * half + far) * inverse_unit,
+            tolerance: shared::tolerance(half, far) * inverse_unit,
         })
     }
 }
