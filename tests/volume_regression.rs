@@ -148,6 +148,33 @@ fn cells_and_faces_agree_on_what_is_one_face() {
 }
 
 #[test]
+fn a_small_file_cannot_ask_for_much_memory() {
+    // 6 x 6 x 7 cells of 33^3 coefficients each, from 38 x 38 x 39 points.
+    let knots = |spans: usize| {
+        let mut list = vec![0.0; 33];
+        list.extend((1..spans).map(|i| i as f64));
+        list.extend(vec![spans as f64; 33]);
+        list
+    };
+    let [u, w] = [6, 7].map(knots);
+    let mut points = Vec::new();
+    for k in 0..39 {
+        for j in 0..38 {
+            for i in 0..38 {
+                points.push([i, j, k]);
+            }
+        }
+    }
+    let error = refused(&patches(&[format!(
+        "{{ degrees = [32, 32, 32], knots = [{u:?}, {u:?}, {w:?}], points = {points:?} }}"
+    )]));
+    assert!(
+        error.contains("9056124 Bézier coefficients") && error.contains("at most 8388608"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_long_patch_is_made_ready_in_time_that_grows_with_its_length() {
     let count = 20_000;
     let knots = (0..=count).map(f64::from);

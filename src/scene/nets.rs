@@ -2,7 +2,7 @@
 
 use super::build::{curve, frame, placed, region};
 use super::error::Place;
-use super::limits::MAX_CELLS;
+use super::limits::{MAX_CELLS, MAX_COEFFICIENTS};
 use super::model::{
     self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
     VolumeModel, VolumeSource,
@@ -53,18 +53,7 @@ pub(super) fn part(
             maker.curve(*form, chain, *turn)?
         }
     };
-    let cells = |v: &NurbsVolume| {
-        v.knots()
-            .iter()
-            .map(|k| k.spans().count())
-            .product::<usize>()
-    };
-    let count = volumes.iter().map(cells).fold(0, usize::saturating_add);
-    if count > MAX_CELLS {
-        let found = format!("{count} Bézier cells");
-        let wanted = format!("at most {MAX_CELLS}: products of the knot spans in u, v and w");
-        return Err(maker.fault("", found, &wanted, Some("use fewer knots".to_owned())));
-    }
+    maker.check_size(&volumes)?;
     for (index, volume) in volumes.iter().enumerate() {
         let (place, key) = match source {
             VolumeSource::Patches(patches) => (patches[index].place, format!(".patches[{index}]")),
@@ -206,6 +195,37 @@ impl Maker<'_> {
             })
         });
         made.collect()
+    }
+
+    /// Refuses what would take too much memory.
+    fn check_size(&self, volumes: &[NurbsVolume]) -> Result<(), Error> {
+        let cells = |v: &NurbsVolume| {
+            let spans = v.knots().iter().map(|k| k.spans().count());
+            spans.fold(1, usize::saturating_mul)
+        };
+        let coefficients = |v: &NurbsVolume| {
+            let each = v.degrees().into_iter().map(|p| p + 1).product();
+            cells(v).saturating_mul(each)
+        };
+        let total = |of: &dyn Fn(&NurbsVolume) -> usize| {
+            volumes.iter().map(of).fold(0, usize::saturating_add)
+        };
+        let count = total(&cells);
+        if count > MAX_CELLS {
+            let found = format!("{count} Bézier cells");
+            let wanted = format!("at most {MAX_CELLS}: products of the knot spans in u, v and w");
+            return Err(self.fault("", found, &wanted, Some("use fewer knots".to_owned())));
+        }
+        let count = total(&coefficients);
+        if count > MAX_COEFFICIENTS {
+            let found = format!("{count} Bézier coefficients");
+            let wanted = format!(
+                "at most {MAX_COEFFICIENTS}: for each cell the product of the degrees plus one"
+            );
+            let hint = "use lower degrees or fewer knots".to_owned();
+            return Err(self.fault("", found, &wanted, Some(hint)));
+        }
+        Ok(())
     }
 
     /// Refuses a patch that folds.
