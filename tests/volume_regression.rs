@@ -127,6 +127,48 @@ fn blocks_that_overlap_keep_the_faces_they_share_on_one_side() {
     assert!(twice.warnings()[0].contains("patches 0 and 1 overlap"));
 }
 
+/// A patch of degree 1, 1, `z.len() - 1` over the unit square.
+fn column(z: &[f64]) -> String {
+    let p = z.len() - 1;
+    let mut points = Vec::new();
+    for z in z {
+        for n in 0..4 {
+            points.push([f64::from(n & 1), f64::from(n >> 1), *z]);
+        }
+    }
+    let knots = [vec![0; p + 1], vec![1; p + 1]].concat();
+    format!(
+        "{{ degrees = [1, 1, {p}], knots = [[0, 0, 1, 1], [0, 0, 1, 1], {knots:?}], points = {points:?} }}"
+    )
+}
+
+#[test]
+fn a_flat_patch_is_refused_and_a_flat_cell_adds_nothing() {
+    let error = refused(&patches(&[column(&[0.5, 0.5])]));
+    assert!(
+        error.contains("solid[0].patches[0]") && error.contains("flat"),
+        "{error}"
+    );
+    // Two cells, the second without height.
+    let mut points = Vec::new();
+    for z in [0.0, 1.0, 1.0] {
+        for n in 0..4 {
+            points.push([f64::from(n & 1), f64::from(n >> 1), z]);
+        }
+    }
+    let ended = scene(&patches(&[format!(
+        "{{ degrees = [1, 1, 1], knots = [[0, 0, 1, 1], [0, 0, 1, 1], [0, 0, 1, 2, 2]], points = {points:?} }}"
+    )]));
+    assert_eq!(distance(&ended, [0.5, 0.5, 0.75]), -0.25);
+    assert_eq!(distance(&ended, [0.5, 0.5, 1.25]), 0.25);
+    assert_eq!(distance(&ended, [0.5, 0.5, 1.0]), 0.0);
+    assert!(
+        !ended
+            .assembly()
+            .contains(DVec3::new(0.5, 0.5, 1.0f64.next_up()))
+    );
+}
+
 #[test]
 fn cells_and_faces_agree_on_what_is_one_face() {
     // Neighbours a rounding apart, far out.

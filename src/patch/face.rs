@@ -322,6 +322,8 @@ fn faces_of(
         spans
     });
     let degrees = volume.degrees();
+    // One that is one to one has one sign all through; a flat cell has that of the others.
+    let whole = whole_sign(&volume, &spans)?;
     // Cells at edges have several faces.
     let mut signs: HashMap<[usize; 3], i8> = HashMap::new();
     for parameter in 0..3 {
@@ -352,7 +354,7 @@ fn faces_of(
                         Entry::Vacant(place) => {
                             let boxed = std::array::from_fn(|k| spans[k][cell[k]]);
                             let sign = jacobian_sign(&volume, boxed)?;
-                            *place.insert(sign)
+                            *place.insert(if sign == 0 { whole } else { sign })
                         }
                     };
                     faces.push(Face {
@@ -376,6 +378,21 @@ fn faces_of(
         }
     }
     Ok(())
+}
+
+/// The sign of det [X_u X_v X_w] in the first cell that is not flat.
+fn whole_sign(volume: &NurbsVolume, spans: &[Vec<[f64; 2]>; 3]) -> Result<i8, NurbsError> {
+    for &w in &spans[2] {
+        for &v in &spans[1] {
+            for &u in &spans[0] {
+                let sign = jacobian_sign(volume, [u, v, w])?;
+                if sign != 0 {
+                    return Ok(sign);
+                }
+            }
+        }
+    }
+    Ok(0)
 }
 
 /// The sign of det [X_u X_v X_w] in a cell: that of its integral by Gauss's rule of three points.

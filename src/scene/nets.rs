@@ -16,7 +16,7 @@ use crate::math::Similarity;
 use crate::math::bernstein;
 use crate::math::{Dd, Real};
 use crate::nurbs::{
-    KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError,
+    JacobianSign, KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError,
 };
 use crate::region::{
     Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, RegionError, beziers,
@@ -68,6 +68,15 @@ pub(super) fn part(
     };
     let body = fields.and_then(|fields| Patches::new(&frame, volumes, fields));
     let body = body.map_err(|e| maker.refused(&e.to_string()))?;
+    if body.faces().faces().is_empty() {
+        let key = match source {
+            VolumeSource::Patches(_) => ".patches",
+            VolumeSource::Section { .. } => ".section",
+            VolumeSource::Curve { .. } => ".profile",
+        };
+        let found = "volumes without a face that bounds them".to_owned();
+        return Err(maker.fault(key, found, "volumes that enclose something", None));
+    }
     Ok(Part::new(
         solid.name.clone(),
         solid.material,
@@ -243,6 +252,21 @@ impl Maker<'_> {
                 let hint = "split the patch where it folds, or move its control points";
                 let hint = Some(hint.to_owned());
                 Err(self.model.error(place, &path, found, wanted, hint).into())
+            }
+            OrientationError::Flat { .. } => {
+                let flat = |sign: &JacobianSign| matches!(sign, JacobianSign::Flat);
+                let signs = volume.jacobian_signs().unwrap_or_default();
+                if signs.iter().all(|(sign, _)| flat(sign)) {
+                    let path = format!("{}{key}", self.solid.path);
+                    let found =
+                        "a volume that is flat: its Jacobian determinant is zero throughout";
+                    let wanted = "a patch that fills space";
+                    let hint =
+                        "move its control points out of the surface they are in, or leave it out";
+                    let (found, hint) = (Some(found.to_owned()), Some(hint.to_owned()));
+                    return Err(self.model.error(place, &path, found, wanted, hint).into());
+                }
+                Ok(())
             }
             _ => Ok(()),
         }
