@@ -270,3 +270,19 @@ fn what_is_empty_is_named() {
     }
 }
 
+#[test]
+fn weights_of_all_sizes_in_one_cell_are_refused() {
+    let with = |least: f64| {
+        patches(&[block([0.0; 3], [1.0; 3]).replace(
+            " }",
+            &format!(", weights = [1, 1, 1, 1, 1, 1, 1, {least:e}] }}"),
+        )])
+    };
+    let error = refused(&with(1e-13));
+    assert!(
+        error.contains("solid[0].patches[0]") && error.contains("1e13") && error.contains("cell 0"),
+        "{error}"
+    );
+    scene(&with(1e-9));
+}
+

@@ -2,7 +2,7 @@
 
 use super::build::{curve, frame, placed, region};
 use super::error::Place;
-use super::limits::{MAX_CELLS, MAX_COEFFICIENTS};
+use super::limits::{MAX_CELLS, MAX_COEFFICIENTS, MAX_WEIGHT_RATIO};
 use super::model::{
     self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
     VolumeModel, VolumeSource,
@@ -16,7 +16,8 @@ use crate::math::Similarity;
 use crate::math::bernstein;
 use crate::math::{Dd, Real};
 use crate::nurbs::{
-    JacobianSign, KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError,
+    CellIndex, JacobianSign, KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume,
+    OrientationError,
 };
 use crate::region::{
     Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, RegionError, beziers,
@@ -239,6 +240,19 @@ impl Maker<'_> {
 
     /// Refuses a patch that folds.
     fn check(&self, key: &str, volume: &NurbsVolume, place: Place) -> Result<(), Error> {
+        let path = format!("{}{key}", self.solid.path);
+        if let Some((cell, [low, high])) = widest_weights(volume)
+            && !(high / low <= MAX_WEIGHT_RATIO)
+        {
+            let found = Some(format!(
+                "weights from {low:e} to {high:e}, a ratio of {:.0e}, in Bézier {cell}",
+                high / low
+            ));
+            let wanted = format!("a ratio of at most {MAX_WEIGHT_RATIO:e} in each cell");
+            let hint = "insert knots where the weights change, or bring them nearer to each other";
+            let hint = Some(hint.to_owned());
+            return Err(self.model.error(place, &path, found, &wanted, hint).into());
+        }
         let Err(error) = volume.orientation() else {
             return Ok(());
         };
@@ -246,7 +260,6 @@ impl Maker<'_> {
         match error {
             OrientationError::Folded { .. } if fold_depth(volume) <= HAIR => Ok(()),
             OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
-                let path = format!("{}{key}", self.solid.path);
                 let found = Some(error.to_string());
                 let wanted = "a Jacobian determinant of one sign";
                 let hint = "split the patch where it folds, or move its control points";
@@ -257,8 +270,7 @@ impl Maker<'_> {
                 let flat = |sign: &JacobianSign| matches!(sign, JacobianSign::Flat);
                 let signs = volume.jacobian_signs().unwrap_or_default();
                 if signs.iter().all(|(sign, _)| flat(sign)) {
-                    let path = format!("{}{key}", self.solid.path);
-                    let found =
+                        let found =
                         "a volume that is flat: its Jacobian determinant is zero throughout";
                     let wanted = "a patch that fills space";
                     let hint =
@@ -480,6 +492,32 @@ fn fold_depth(volume: &NurbsVolume) -> f64 {
     } else {
         f64::INFINITY
     }
+}
+
+/// The Bézier cell whose weights are furthest apart, with the least and the largest of them; `None`
+/// where all weights of the net are near enough to each other.
+fn widest_weights(volume: &NurbsVolume) -> Option<(CellIndex, [f64; 2])> {
+    let ends = |weights: &mut dyn Iterator<Item = f64>| {
+        weights.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], w| {
+            [low.min(w), high.max(w)]
+        })
+    };
+    // Those of cells are means of the net's.
+    let [low, high] = ends(&mut volume.weights().iter().copied());
+    if high / low <= MAX_WEIGHT_RATIO {
+        return None;
+    }
+    let spans = volume.knots().each_ref().map(|k| k.spans().count());
+    let pieces = volume.to_bezier().ok()?;
+    let each = pieces.iter().enumerate().map(|(number, piece)| {
+        let [a, b, _] = spans;
+        let spans = [number % a, number / a % b, number / (a * b)];
+        let points = piece.cell.control_points().iter();
+        let ends = ends(&mut points.map(|h| h.weight));
+        (CellIndex { number, spans }, ends)
+    });
+    let ratio = |[low, high]: [f64; 2]| high / low;
+    each.max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))
 }
 
 /// The NURBS of a patch.
