@@ -143,6 +143,39 @@ fn column(z: &[f64]) -> String {
 }
 
 #[test]
+fn a_narrow_fold_is_refused() {
+    let error = refused(&patches(&[column(&[
+        0.0,
+        0.291_768_75,
+        0.271_037_5,
+        0.271_139_583_333_33,
+    ])]));
+    assert!(error.contains("folds over itself"), "{error}");
+}
+
+#[test]
+fn a_fold_of_rounded_decimals_is_told_of() {
+    // The last slope is 0, or was meant to be: six decimals.
+    let level = scene(&patches(&[column(&[0.0, 0.333_333, 0.666_667, 0.666_667])]));
+    assert!(level.warnings().is_empty(), "{:?}", level.warnings());
+    let rounded = scene(&patches(&[column(&[0.0, 0.333_333, 0.666_667, 0.666_666])]));
+    let said = rounded.warnings();
+    assert!(
+        said.len() == 1
+            && said[0].starts_with("solid[0].patches[0]: folds over itself by the rounding"),
+        "{said:?}"
+    );
+    // The same fold given with all digits is meant.
+    let error = refused(&patches(&[column(&[
+        0.0,
+        0.333_333_333_333_333,
+        0.666_667,
+        0.666_666,
+    ])]));
+    assert!(error.contains("folds over itself"), "{error}");
+}
+
+#[test]
 fn a_flat_patch_is_refused_and_a_flat_cell_adds_nothing() {
     let error = refused(&patches(&[column(&[0.5, 0.5])]));
     assert!(
@@ -284,5 +317,32 @@ fn weights_of_all_sizes_in_one_cell_are_refused() {
         "{error}"
     );
     scene(&with(1e-9));
+}
+
+#[test]
+fn a_fold_of_high_degree_is_found_and_doubt_is_told() {
+    let height = |k: usize, fold: f64| k as f64 + if k == 10 { fold } else { 0.0 };
+    let high = |fold: f64| {
+        let mut points = Vec::new();
+        for k in 0..21 {
+            for j in 0..21 {
+                for i in 0..21 {
+                    points.push([i as f64, j as f64, height(k, fold)]);
+                }
+            }
+        }
+        let knots = [[0; 21], [1; 21]].concat();
+        patches(&[format!(
+            "{{ degrees = [20, 20, 20], knots = [{knots:?}, {knots:?}, {knots:?}], points = {points:?} }}"
+        )])
+    };
+    let error = refused(&high(60.0));
+    assert!(error.contains("folds over itself"), "{error}");
+    let doubtful = scene(&high(0.0));
+    assert!(
+        doubtful.warnings()[0].contains("not proved one to one"),
+        "{:?}",
+        doubtful.warnings()
+    );
 }
 

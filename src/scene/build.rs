@@ -111,7 +111,7 @@ impl Scene {
                 SolidKind::Volume(volume) => {
                     let notes = volume.notes.iter();
                     warnings.extend(notes.map(|n| format!("{}: {n}", solid.path)));
-                    let part = nets::part(&model, solid, volume)?;
+                    let part = nets::part(&model, solid, volume, &mut warnings)?;
                     if let Body::Patches(patches) = &**part.body()
                         && let Some(([first, later], [x, y, z])) =
                             patches.overlap().map(|(pair, at)| (pair, at.to_array()))

@@ -23,6 +23,7 @@ mod build;
 mod error;
 mod export;
 mod fields;
+mod fold;
 mod json;
 mod keys;
 mod limits;

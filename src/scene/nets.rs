@@ -2,6 +2,7 @@
 
 use super::build::{curve, frame, placed, region};
 use super::error::Place;
+use super::fold::{self, Fold};
 use super::limits::{MAX_CELLS, MAX_COEFFICIENTS, MAX_WEIGHT_RATIO};
 use super::model::{
     self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
@@ -25,11 +26,12 @@ use crate::region::{
 use crate::solid::{Body, Field, Part, Patches, Turn};
 use std::sync::Arc;
 
-/// The part that a volume is.
+/// The part that a volume is; what a user should know of it goes to `warnings`.
 pub(super) fn part(
     model: &SceneModel,
     solid: &SolidModel,
     volume: &VolumeModel,
+    warnings: &mut Vec<String>,
 ) -> Result<Part, Error> {
     let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
     let maker = Maker { model, solid };
@@ -61,7 +63,14 @@ pub(super) fn part(
             VolumeSource::Section { section, .. } => (section.place, ".section".to_owned()),
             VolumeSource::Curve { .. } => (solid.place, ".profile".to_owned()),
         };
-        maker.check(&key, volume, place)?;
+        let rounding = || match source {
+            VolumeSource::Section { section, .. } => fold::rounding(section.points.iter()),
+            VolumeSource::Patches(patches) => fold::rounding(patches[index].points.iter()),
+            VolumeSource::Curve { .. } => fold::rounding(volume.control_points().iter()),
+        };
+        if let Some(said) = maker.check(&key, volume, place, rounding)? {
+            warnings.push(said);
+        }
     }
     let fields = match source {
         VolumeSource::Patches(patches) => fields(patches, &volumes),
@@ -238,49 +247,77 @@ impl Maker<'_> {
         Ok(())
     }
 
-    /// Refuses a patch that folds.
-    fn check(&self, key: &str, volume: &NurbsVolume, place: Place) -> Result<(), Error> {
+    /// Refuses a patch that folds, that is flat, or whose weights are too far apart; else what a user
+    /// should know.
+    ///
+    /// * `rounding`: that of the coordinates it was given by, in their own units.
+    fn check(
+        &self,
+        key: &str,
+        volume: &NurbsVolume,
+        place: Place,
+        rounding: impl FnOnce() -> f64,
+    ) -> Result<Option<String>, Error> {
         let path = format!("{}{key}", self.solid.path);
+        let refused = |found: String, wanted: &str, hint: &str| {
+            let (found, hint) = (Some(found), Some(hint.to_owned()));
+            Err(self.model.error(place, &path, found, wanted, hint).into())
+        };
         if let Some((cell, [low, high])) = widest_weights(volume)
             && !(high / low <= MAX_WEIGHT_RATIO)
         {
-            let found = Some(format!(
+            let found = format!(
                 "weights from {low:e} to {high:e}, a ratio of {:.0e}, in Bézier {cell}",
                 high / low
-            ));
+            );
             let wanted = format!("a ratio of at most {MAX_WEIGHT_RATIO:e} in each cell");
             let hint = "insert knots where the weights change, or bring them nearer to each other";
-            let hint = Some(hint.to_owned());
-            return Err(self.model.error(place, &path, found, &wanted, hint).into());
+            return refused(found, &wanted, hint);
         }
         let Err(error) = volume.orientation() else {
-            return Ok(());
+            return Ok(None);
         };
-        // A cell without volume adds nothing, and what could not be settled is not known to fold.
         match error {
-            OrientationError::Folded { .. } if fold_depth(volume) <= HAIR => Ok(()),
-            OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
-                let found = Some(error.to_string());
-                let wanted = "a Jacobian determinant of one sign";
-                let hint = "split the patch where it folds, or move its control points";
-                let hint = Some(hint.to_owned());
-                Err(self.model.error(place, &path, found, wanted, hint).into())
+            OrientationError::Folded {
+                positive,
+                negative,
+                cells,
+            } => {
+                let fold = Fold::new(volume, [positive, negative], cells);
+                if fold.is_rounding(rounding) {
+                    return Ok(Some(format!(
+                        "{path}: folds over itself by the rounding of its control points, a share of {:.0e}, at parameters {negative:?} for one: taken as if it did not",
+                        fold.share()
+                    )));
+                }
+                refused(
+                    error.to_string(),
+                    "a Jacobian determinant of one sign",
+                    "split the patch where it folds, or move its control points",
+                )
             }
+            OrientationError::Nurbs(_) => refused(
+                error.to_string(),
+                "a Jacobian determinant of one sign",
+                "split the patch where it folds, or move its control points",
+            ),
             OrientationError::Flat { .. } => {
                 let flat = |sign: &JacobianSign| matches!(sign, JacobianSign::Flat);
                 let signs = volume.jacobian_signs().unwrap_or_default();
                 if signs.iter().all(|(sign, _)| flat(sign)) {
-                        let found =
-                        "a volume that is flat: its Jacobian determinant is zero throughout";
-                    let wanted = "a patch that fills space";
-                    let hint =
-                        "move its control points out of the surface they are in, or leave it out";
-                    let (found, hint) = (Some(found.to_owned()), Some(hint.to_owned()));
-                    return Err(self.model.error(place, &path, found, wanted, hint).into());
+                    return refused(
+                        "a volume that is flat: its Jacobian determinant is zero throughout".into(),
+                        "a patch that fills space",
+                        "move its control points out of the surface they are in, or leave it out",
+                    );
                 }
-                Ok(())
+                // A cell without volume adds nothing.
+                Ok(None)
             }
-            _ => Ok(()),
+            // What could not be settled is not known to fold.
+            _ => Ok(Some(format!(
+                "{path}: not proved one to one: {error}; where it folds, answers may be wrong"
+            ))),
         }
     }
 
@@ -463,34 +500,6 @@ impl Maker<'_> {
             frame,
             Turn::new(turn.start, turn.angle),
         ))
-    }
-}
-
-/// Folds whose determinant is below this share of the other sign's largest are those of rounded
-/// decimals, at rims and axes where it would be 0.
-const HAIR: f64 = 1e-5;
-
-/// The least determinant as a share of the largest one of the other sign, on a lattice over every
-/// cell with its corners: a fold of rounding is at a corner or an edge.
-fn fold_depth(volume: &NurbsVolume) -> f64 {
-    const PARTS: u32 = 8;
-    let (mut low, mut high) = (0.0_f64, 0.0_f64);
-    for piece in volume.to_bezier().unwrap_or_default() {
-        for n in 0..(PARTS + 1).pow(3) {
-            let place = |d: u32| f64::from(n / d % (PARTS + 1)) / f64::from(PARTS);
-            let at = [place(1), place(PARTS + 1), place((PARTS + 1).pow(2))];
-            let Ok(jacobian) = volume.jacobian(piece.parameters(at)) else {
-                return f64::INFINITY;
-            };
-            low = low.min(jacobian.determinant);
-            high = high.max(jacobian.determinant);
-        }
-    }
-    let share = low.abs().min(high) / low.abs().max(high);
-    if share.is_finite() {
-        share
-    } else {
-        f64::INFINITY
     }
 }
 
