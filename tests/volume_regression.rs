@@ -346,3 +346,38 @@ fn a_fold_of_high_degree_is_found_and_doubt_is_told() {
     );
 }
 
+#[test]
+fn a_file_is_read_as_the_exchange_reads_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let knots = "2 2  0 0 1 1\n".repeat(3);
+    let cube = format!("700 1 0 0  3 0\n{knots} 0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1");
+    let read = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("written");
+        let there = voxlathe::exchange::read(&path);
+        let here = parse(&format!(
+            "[[solid]]\nkind = 'volume'\nfile = {:?}",
+            path.display().to_string()
+        ));
+        if let (Err(there), Err(here)) = (&there, &here) {
+            let there = there.to_string();
+            let reason = there.split(": ").last().expect("a reason");
+            assert!(here.contains(reason), "{here}\n{there}");
+        }
+        assert_eq!(there.is_ok(), here.is_ok(), "{name}");
+        here
+    };
+    read("marked.g2", format!("\u{feff}{cube}").as_bytes())
+        .expect("a byte order mark is none of the text");
+    let error = read("cube.json", cube.as_bytes()).expect_err("not what its name says");
+    assert!(error.contains("rename the file"), "{error}");
+    let error = read("cube.g2", &[0x1f, 0x8b, 8, 0]).expect_err("compressed");
+    assert!(error.contains("decompress it first"), "{error}");
+    let said = read("cube.txt", cube.as_bytes()).expect("the content tells");
+    assert!(
+        said.warnings()[0].contains("not told by the name"),
+        "{:?}",
+        said.warnings()
+    );
+}
+
