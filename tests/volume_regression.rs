@@ -304,6 +304,44 @@ fn what_is_empty_is_named() {
 }
 
 #[test]
+fn joints_of_blocks_of_different_sizes_are_inside() {
+    for turn in 0..3_usize {
+        let laid = |p: [f64; 3]| [p[(3 - turn) % 3], p[(4 - turn) % 3], p[(5 - turn) % 3]];
+        let block = |a: [f64; 3], b: [f64; 3]| block(laid(a), laid(b));
+        let l = [
+            block([0.0; 3], [2.0, 1.0, 1.0]),
+            block([0.0, 0.0, 1.0], [1.0, 1.0, 2.0]),
+        ];
+        let text = format!(
+            "[[solid]]\nkind = 'box'\nsize = [8, 8, 8]\n{}\noperation = 'subtract'",
+            patches(&l)
+        );
+        let cut = scene(&text);
+        let p = laid([0.5, 0.5, 1.0]);
+        assert!(
+            !cut.assembly().contains(p.into()),
+            "a sheet is left at {p:?}"
+        );
+        assert!((distance(&cut, p) - 0.5).abs() < 1e-14);
+        // On the step itself the cut solid is closed.
+        assert!(cut.assembly().contains(laid([1.5, 0.5, 1.0]).into()));
+    }
+    // Bricks whose joints cross.
+    let bricks = scene(&format!(
+        "[[solid]]\nkind = 'box'\nsize = [8, 8, 8]\n{}\noperation = 'subtract'",
+        patches(&[
+            block([0.0; 3], [1.0, 1.0, 1.0]),
+            block([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]),
+            block([0.0, 0.0, 1.0], [1.25, 1.0, 2.0]),
+            block([1.25, 0.0, 1.0], [2.0, 1.0, 2.0]),
+        ])
+    ));
+    for x in [0.5, 1.0, 1.125, 1.25, 1.5] {
+        assert!(!bricks.assembly().contains(DVec3::new(x, 0.5, 1.0)), "{x}");
+    }
+}
+
+#[test]
 fn weights_of_all_sizes_in_one_cell_are_refused() {
     let with = |least: f64| {
         patches(&[block([0.0; 3], [1.0; 3]).replace(

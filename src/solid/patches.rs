@@ -258,7 +258,25 @@ impl Patches {
         }
         let local = self.frame.to_local(point);
         let exact = || self.frame.to_local_exact(point);
-        self.nets.cells.side(local.point, local.error, exact)
+        let side = self.nets.cells.side(local.point, local.error, exact);
+        // Where cells of different sizes meet, a face of one is on those of several: cells know of
+        // pairs only, the outer faces of all.
+        if side == Side::On && self.is_beneath(point, local.point) {
+            Side::Inside
+        } else {
+            side
+        }
+    }
+
+    /// Whether a point of the solid is further from the faces that bound it than rounding.
+    #[cold]
+    fn is_beneath(&self, point: DVec3, local: DVec3) -> bool {
+        let size = self.bounds.longest_side() + point.abs().max_element();
+        let scale = self.frame.scale();
+        // Distances are told apart to 64 eps.
+        let rounding = 256.0 * f64::EPSILON * size / scale;
+        let limit = (self.margin / scale).max(2.0 * rounding);
+        self.nets.faces.distance(local, limit) > rounding
     }
 
     pub(super) fn distance(&self, point: DVec3, inside: bool, limit: f64) -> f64 {
