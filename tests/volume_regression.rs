@@ -385,6 +385,51 @@ fn a_fold_of_high_degree_is_found_and_doubt_is_told() {
 }
 
 #[test]
+fn scalars_are_given_on_the_faces_too() {
+    let mut points: Vec<[f64; 3]> = (0..8)
+        .map(|n: u32| {
+            [
+                0.1 + f64::from(n & 1),
+                0.2 + f64::from(n >> 1 & 1),
+                0.3 + f64::from(n >> 2),
+            ]
+        })
+        .collect();
+    // Of no shape that is known.
+    points[7] = [1.25, 1.3, 1.45];
+    points[2] = [0.0, 1.1, 0.35];
+    let density = vec![7.0; 8];
+    let placed = scene(&format!(
+        "[[solid]]\nkind = 'volume'\npatches = [{{ degrees = [1, 1, 1], knots = [[0, 0, 1, 1], [0, 0, 1, 1], [0, 0, 1, 1]], points = {points:?}, fields = {{ density = {density:?} }} }}]
+         place = [{{ rotate = {{ axis = [1, 2, 3], degrees = 33 }} }}, {{ translate = [1e3, 0.1, 0.7] }}]"
+    ));
+    let voxlathe::solid::Body::Patches(volume) = &**placed.assembly().parts()[0].body() else {
+        panic!("a volume");
+    };
+    let mut held = 0;
+    for n in 0..2000_u32 {
+        // Feet of points outside are on the faces, to their rounding.
+        let share = |k: u32| {
+            (f64::from(n) * [0.819_172_513, 0.671_043_606, 0.549_700_477][k as usize]).fract()
+        };
+        let p = DVec3::new(share(0), share(1), share(2)) * 3.0 - 1.0;
+        let b = placed.bounds();
+        let p = b.min + p * b.sides();
+        let sd = placed.assembly().signed_distance(p);
+        let slope = DVec3::from_array(DVec3::AXES.map(|e| {
+            let f = |s: f64| placed.assembly().signed_distance(p + s * 1e-4 * e);
+            (f(1.0) - f(-1.0)) / 2e-4
+        }));
+        let q = p - slope.normalize() * sd;
+        if placed.assembly().contains(q) {
+            held += 1;
+            assert!(volume.invert(q).is_some(), "{q}");
+        }
+    }
+    assert!(held > 100, "{held}");
+}
+
+#[test]
 fn a_file_is_read_as_the_exchange_reads_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let knots = "2 2  0 0 1 1\n".repeat(3);

@@ -232,7 +232,19 @@ impl Patches {
     /// Where a point comes from; `None` outside.
     #[must_use]
     pub fn invert(&self, point: DVec3) -> Option<Preimage> {
-        self.nets.cells.invert(self.frame.to_local(point).point)
+        let local = self.frame.to_local(point).point;
+        self.nets.cells.invert(local).or_else(|| {
+            // The point of the net's coordinates is rounded; on a face it may be outside of the net.
+            if self.side(point) == Side::Outside {
+                return None;
+            }
+            let nearest = self.nets.faces.nearest(local)?;
+            let face = self.nets.faces.faces().get(nearest.face)?;
+            Some(Preimage {
+                volume: face.patch,
+                parameters: face.volume_parameters(nearest.parameters),
+            })
+        })
     }
 
     /// The scalar at a point of the solid; 0 for a field that it does not have.
