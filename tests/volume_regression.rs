@@ -430,6 +430,39 @@ fn scalars_are_given_on_the_faces_too() {
 }
 
 #[test]
+fn a_patch_that_overlaps_itself_is_told_of() {
+    // A ring of rectangular section that goes round one and a quarter times, rising not at all.
+    let s = std::f64::consts::FRAC_1_SQRT_2;
+    let ring = |quarters: usize| {
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        for i in 0..=2 * quarters {
+            let a = i as f64 * PI / 4.0;
+            let (far, weight) = if i % 2 == 0 { (1.0, 1.0) } else { (1.0 / s, s) };
+            for z in [0.0, 1.0] {
+                for r in [1.0, 2.0] {
+                    points.push([r * far * a.cos(), r * far * a.sin(), z]);
+                    weights.push(weight);
+                }
+            }
+        }
+        let mut knots = vec![0.0; 3];
+        knots.extend((1..quarters).flat_map(|i| [i as f64; 2]));
+        knots.extend(vec![quarters as f64; 3]);
+        scene(&patches(&[format!(
+            "{{ degrees = [1, 1, 2], knots = [[0, 0, 1, 1], [0, 0, 1, 1], {knots:?}], points = {points:?}, weights = {weights:?} }}"
+        )]))
+    };
+    let said = ring(5);
+    assert!(
+        said.warnings().len() == 1 && said.warnings()[0].contains("patch 0 overlaps itself"),
+        "{:?}",
+        said.warnings()
+    );
+    assert!(ring(3).warnings().is_empty());
+    assert!(ring(4).warnings().is_empty());
+}
+
+#[test]
 fn a_file_is_read_as_the_exchange_reads_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let knots = "2 2  0 0 1 1\n".repeat(3);

@@ -116,10 +116,16 @@ impl Scene {
                         && let Some(([first, later], [x, y, z])) =
                             patches.overlap().map(|(pair, at)| (pair, at.to_array()))
                     {
-                        warnings.push(format!(
-                            "{}: patches {first} and {later} overlap, at [{x}, {y}, {z}] for one: each is measured and bounded by itself; make them solids of their own",
-                            solid.path
-                        ));
+                        let what = if first == later {
+                            format!(
+                                "patch {first} overlaps itself, at [{x}, {y}, {z}] for one: what is held twice is measured twice, and bounded in between; split it over solids of their own"
+                            )
+                        } else {
+                            format!(
+                                "patches {first} and {later} overlap, at [{x}, {y}, {z}] for one: each is measured and bounded by itself; make them solids of their own"
+                            )
+                        };
+                        warnings.push(format!("{}: {what}", solid.path));
                     }
                     part
                 }

@@ -199,19 +199,27 @@ impl Patches {
         &self.nets.volumes
     }
 
-    /// Two volumes that both hold the middle of a cell of the later one, and where, in local
-    /// coordinates; `None` where no middle is held twice.
+    /// Two volumes that both hold the middle of a cell of the later one, or one twice where it holds the
+    /// middle of a cell of its own again, and where, in local coordinates; `None` where no middle is
+    /// held twice.
     #[must_use]
     pub fn overlap(&self) -> Option<([usize; 2], DVec3)> {
-        for (later, volume) in self.nets.volumes.iter().enumerate().skip(1) {
+        for (later, volume) in self.nets.volumes.iter().enumerate() {
             for piece in volume.to_bezier().unwrap_or_default() {
-                let Ok(middle) = volume.evaluate(piece.parameters([0.5; 3])) else {
+                let at = piece.parameters([0.5; 3]);
+                let Ok(middle) = volume.evaluate(at) else {
                     continue;
                 };
                 let middle = DVec3::from_array(middle);
-                // Of several the lowest answers.
-                if let Some(found) = self.nets.cells.invert(middle)
-                    && found.volume < later
+                // Of several the lowest answers. What is its own is so to far less than this.
+                let apart = |found: &Preimage| {
+                    let share = |k: usize| {
+                        (found.parameters[k] - at[k]).abs() / (piece.end[k] - piece.start[k])
+                    };
+                    (0..3).any(|k| share(k) > 0.25)
+                };
+                if let Some(found) = self.nets.cells.invert_in_space(middle)
+                    && (found.volume < later || found.volume == later && apart(&found))
                 {
                     return Some(([found.volume, later], middle));
                 }
@@ -407,7 +415,6 @@ impl Patches {
         moved
     }
 
-    /// The outer faces: lines of constant first parameter.
     /// Whether the surface may come within `margin` (scene units) of a stretch of a path, given in local coordinates.
     pub(super) fn may_meet(&self, stretch: &Stretch, margin: f64) -> bool {
         let Aabb { min, max } = stretch.bounds();
@@ -415,6 +422,7 @@ impl Patches {
         self.nets.faces.may_touch(min - margin, max + margin)
     }
 
+    /// The outer faces: lines of constant first parameter.
     pub(super) fn patches(&self, _seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
         let faces = 0..self.nets.faces.faces().len();
         let cuts = || (0..=8).map(|k| f64::from(k) / 8.0).collect();
