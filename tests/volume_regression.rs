@@ -497,3 +497,54 @@ fn a_file_is_read_as_the_exchange_reads_it() {
     );
 }
 
+#[test]
+fn meshes_are_closed_where_faces_of_different_sizes_meet() {
+    use voxlathe::construct::{AngleInterval, AxisFrame, Construction, DiscForm, cylinder_volume};
+    let closed = |scene: &Scene, chord: f64, volume: f64, area: f64| {
+        for mesh in voxlathe::validate::meshes(scene, chord).expect("meshes") {
+            let mesh = mesh.mesh();
+            assert_eq!(mesh.unmatched_edge(), None);
+            assert!(mesh.chord_error() <= chord);
+            let off = (mesh.volume() - volume).abs();
+            assert!(off <= area * chord + 1e-9, "{} for {volume}", mesh.volume());
+        }
+    };
+    closed(
+        &scene(&patches(&[
+            block([0.0; 3], [2.0, 1.0, 1.0]),
+            block([0.0, 0.0, 1.0], [1.0, 1.0, 2.0]),
+        ])),
+        0.01,
+        3.0,
+        0.0,
+    );
+    // A quarter of a cylinder, and on it the first half of another: the arcs meet half way.
+    let by = Construction::CurveDisc(DiscForm::Polar);
+    let turn = AngleInterval::new(0.0, 90.0).expect("an angle");
+    let below = cylinder_volume(1.0, 1.0, by, turn, &AxisFrame::WORLD).expect("a cylinder");
+    // The direction that turns is that of degree 2.
+    let round = (0..3)
+        .find(|&k| below.degrees()[k] == 2)
+        .expect("one turns");
+    let (first, last) = below.domain()[round];
+    let (half, _) = below.split(round, 0.5 * (first + last)).expect("inside");
+    let raised = half
+        .control_points()
+        .iter()
+        .map(|[x, y, z]| [*x, *y, z + 1.0]);
+    let half = voxlathe::nurbs::NurbsVolume::new(
+        half.knots().clone(),
+        raised.collect(),
+        half.weights().to_vec(),
+    )
+    .expect("valid");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("steps.xml");
+    voxlathe::exchange::write_volumes(&path, &[below, half]).expect("written");
+    let steps = scene(&format!(
+        "[[solid]]\nkind = 'volume'\nfile = {:?}",
+        path.display().to_string()
+    ));
+    closed(&steps, 1e-3, PI / 4.0 * 1.5, 8.0);
+    closed(&steps, 1e-4, PI / 4.0 * 1.5, 8.0);
+}
