@@ -6,15 +6,22 @@
 //!   no_tables/KERNEL    the same sums with the basis functions evaluated again for every row
 //!   pointwise           `evaluate` for each point, on a coarser grid
 //!   fill                what writing the answer takes: the same buffers, the same threads
+//!   membership          occupancy of a volume of eight cells, layer by layer, all threads
 //! ```
 //!
 //! Degrees (3, 2, 2), 256^3 points (32^3 pointwise); throughput is in points. Every answer is
 //! compared with the plain loops bit for bit, and those with `evaluate`, before it is timed.
+//! Membership is that of a bent block of degree 2 with 2 x 2 x 2 spans, on 128^3 voxels; throughput is
+//! in voxels, and some are compared with the inside test by point.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::hint::black_box;
+use voxlathe::Scene;
+use voxlathe::grid::GridSpec;
 use voxlathe::nurbs::{BasisTable, Kernel, KnotVector, NurbsVolume, SimdLevel, tabulate};
+use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
 
 const SIDE: usize = 256;
 const COARSE: usize = 32;
@@ -205,6 +212,64 @@ fn volumes(c: &mut Criterion) {
     group.finish();
 }
 
+/// A block of 2 x 2 x 2 quadratic spans, every control point moved and weighted.
+fn eight_cells() -> Scene {
+    let (mut points, mut weights) = (Vec::new(), Vec::new());
+    for k in 0..4 {
+        for j in 0..4 {
+            for i in 0..4 {
+                let [x, y, z] = [i, j, k].map(f64::from);
+                points.push([
+                    x + 0.15 * (y * z).sin(),
+                    y + 0.2 * (x + z).cos(),
+                    z - 0.15 * (x * y).cos(),
+                ]);
+                weights.push(1.0 + 0.25 * (3.0 * x + 5.0 * y + 7.0 * z).sin());
+            }
+        }
+    }
+    let knots = [[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0]; 3];
+    Scene::parse(&format!(
+        "schema = 1\n[grid]\nresolution = 128\npadding = 0\n[[solid]]\nkind = 'volume'
+         patches = [{{ degrees = [2, 2, 2], knots = {knots:?}, points = {points:?}, weights = {weights:?} }}]"
+    ))
+    .expect("a volume")
+}
+
+fn membership(c: &mut Criterion) {
+    let scene = eight_cells();
+    let mut grid = scene.grid().expect("a grid");
+    // A cube of 128 voxels a side around the bounds' middle.
+    let spacing = grid.spacing();
+    let shift = DVec3::from_array(grid.dims().map(|n| 0.5 * (128 - n) as f64));
+    grid = GridSpec::new([128; 3], grid.origin() - shift * spacing, spacing).expect("a grid");
+    let sampler = LayerSampler::new(scene.assembly(), &grid, Selection::default());
+    let mut buffers = LayerBuffers::default();
+    let mut held = 0_u32;
+    for k in (0..128).step_by(9) {
+        sampler.sample(k, &mut buffers);
+        for n in (0..128 * 128).step_by(13) {
+            let at = grid.centre(n % 128, n / 128, k);
+            let inside = buffers.occupancy[n] != 0;
+            assert_eq!(inside, scene.assembly().contains(at), "{at}");
+            held += u32::from(inside);
+        }
+    }
+    assert!(held > 1000, "{held}");
+    let mut group = c.benchmark_group("volume_membership");
+    group.throughput(Throughput::Elements(128 * 128 * 128));
+    group.bench_function(BenchmarkId::new("eight_cells", 128), |b| {
+        b.iter(|| {
+            (0..128_usize)
+                .into_par_iter()
+                .for_each_init(LayerBuffers::default, |buffers, k| {
+                    sampler.sample(k, black_box(buffers));
+                });
+        });
+    });
+    group.finish();
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default()
@@ -212,6 +277,6 @@ criterion_group! {
         .warm_up_time(std::time::Duration::from_millis(500))
         .measurement_time(std::time::Duration::from_millis(2500))
         .without_plots();
-    targets = volumes
+    targets = volumes, membership
 }
 criterion_main!(benches);

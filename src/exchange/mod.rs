@@ -257,6 +257,14 @@ fn read_file(path: &Path) -> Result<Reading, ExchangeError> {
             limit: MAX_FILE_BYTES,
         });
     }
+    read_bytes(path, &bytes)
+}
+
+/// All splines of a file of that name and content: what [`read`] does, wherever the bytes come from.
+///
+/// # Errors
+/// Those of [`read`], but for its own around them.
+pub(crate) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<Reading, ExchangeError> {
     let start = Place::Line { line: 1, column: 1 };
     if bytes.starts_with(&[0x1f, 0x8b]) {
         return Err(ExchangeError::Unsupported {
@@ -264,7 +272,7 @@ fn read_file(path: &Path) -> Result<Reading, ExchangeError> {
             what: "the file is compressed by gzip; decompress it first".into(),
         });
     }
-    let text = decode(&bytes)?;
+    let text = decode(bytes)?;
     let (named, seen) = (Format::of_name(path), Format::of_text(text));
     let format = match (named, seen) {
         (Some(named), Some(seen)) if named != seen => {

@@ -15,6 +15,13 @@
 //! so that every point of the cell and its point of the triangles at the same parameters are within
 //! the sum: the distance both ways, and as points move continuously, what is further away than that
 //! is on the same side of both.
+//!
+//! # Where faces of different sizes meet
+//!
+//! An edge of one face may run along several of others. A piece of an edge that no other triangle has
+//! in the other direction takes in all ends of such pieces that lie on it, so that both sides have
+//! them all. With E the bound above, a triangle's point moves by E at most when a point of its edge
+//! goes from the chord to the surface, which makes 2 E.
 
 use super::tessellate::rounding;
 use super::triangles::Mesh;
@@ -43,36 +50,49 @@ pub(super) fn tessellate(body: &Patches, chord_error: f64) -> Result<Mesh, MeshE
     }
     let faces = body.faces().faces();
     let limit = |n: f64| 2.0 * n * n * as_f64(faces.len());
-    // The error falls with the square of n: from a coarse grid's the count is known nearly.
-    let mut n = 4_u32;
-    let error = loop {
-        let error = largest_error(faces, n);
-        if error <= budget {
-            break error;
-        }
-        let wanted = (f64::from(n) * (error / budget).sqrt() * 1.05).ceil();
-        if !(limit(wanted) <= as_f64(MAX_TRIANGLES)) {
-            return Err(MeshError::TooManyTriangles {
-                found: chord_error,
-                triangles: limit(wanted),
-                limit: MAX_TRIANGLES,
-            });
-        }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "below the limit of triangles"
-        )]
-        {
-            n = (wanted as u32).max(n + 1);
+    let divide = |budget: f64| -> Result<(u32, f64), MeshError> {
+        // The error falls with the square of n: from a coarse grid's the count is known nearly.
+        let mut n = 4_u32;
+        loop {
+            let error = largest_error(faces, n);
+            if error <= budget {
+                return Ok((n, error));
+            }
+            let wanted = (f64::from(n) * (error / budget).sqrt() * 1.05).ceil();
+            if !(limit(wanted) <= as_f64(MAX_TRIANGLES)) {
+                return Err(MeshError::TooManyTriangles {
+                    found: chord_error,
+                    triangles: limit(wanted),
+                    limit: MAX_TRIANGLES,
+                });
+            }
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "below the limit of triangles"
+            )]
+            {
+                n = (wanted as u32).max(n + 1);
+            }
         }
     };
-    let mut welded = Welded::new(1e-12 * size.max(reach * 1e-3));
-    let mut triangles = Vec::new();
-    for face in faces {
-        add(face, n, &mut welded, &mut triangles);
+    let hair = 1e-12 * size.max(reach * 1e-3);
+    let (n, error) = divide(budget)?;
+    let mut grids = Grids::new(faces, n, hair);
+    let mut error = error;
+    let mut within = grids.ends_within(error);
+    if !within.is_empty() {
+        if 2.0 * error > budget {
+            let (n, finer) = divide(0.5 * budget)?;
+            grids = Grids::new(faces, n, hair);
+            within = grids.ends_within(finer);
+            error = finer;
+        }
+        error *= 2.0;
     }
-    let vertices = welded.points.iter().map(|&p| frame.to_world(p)).collect();
+    let triangles = grids.triangles(&within);
+    let points = grids.welded.points.iter();
+    let vertices = points.map(|&p| frame.to_world(p)).collect();
     Ok(Mesh::new(
         vertices,
         triangles,
@@ -137,35 +157,211 @@ impl Welded {
     }
 }
 
-/// Adds the triangles of a face.
-fn add(face: &OuterFace, n: u32, welded: &mut Welded, triangles: &mut Vec<[u32; 3]>) {
-    let mut grid = Vec::with_capacity(((n + 1) * (n + 1)) as usize);
-    for j in 0..=n {
-        for i in 0..=n {
-            let at = [i, j].map(|k| f64::from(k) / f64::from(n));
-            let point = face
-                .surface
-                .evaluate(at)
-                .map_or(DVec3::ZERO, DVec3::from_array);
-            grid.push(welded.index(point));
+/// A piece of a face's edge between two of its points: the face, which of its edges (counter-clockwise
+/// in its parameters, from v = 0) and which piece of that, in the same direction.
+type Piece = (usize, u32, u32);
+
+/// Points that a piece of an edge takes in, in its direction.
+type Within = HashMap<Piece, Vec<u32>>;
+
+/// The faces cut alike, their points welded.
+struct Grids<'a> {
+    faces: &'a [OuterFace],
+    n: u32,
+    /// Vertices of each face, n + 1 in a row.
+    points: Vec<Vec<u32>>,
+    welded: Welded,
+}
+
+impl<'a> Grids<'a> {
+    fn new(faces: &'a [OuterFace], n: u32, hair: f64) -> Self {
+        let mut welded = Welded::new(hair);
+        let points = faces.iter().map(|face| {
+            let mut grid = Vec::with_capacity(((n + 1) * (n + 1)) as usize);
+            for j in 0..=n {
+                for i in 0..=n {
+                    let at = [i, j].map(|k| f64::from(k) / f64::from(n));
+                    grid.push(welded.index(point_of(face, at)));
+                }
+            }
+            grid
+        });
+        Self {
+            points: points.collect(),
+            faces,
+            n,
+            welded,
         }
     }
-    let at = |i: u32, j: u32| grid[(j * (n + 1) + i) as usize];
-    for j in 0..n {
-        for i in 0..n {
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            for [a, b, c] in [[a, b, c], [a, c, d]] {
+
+    /// The ends of a piece, as places in the grid.
+    fn ends(&self, edge: u32, piece: u32) -> [[u32; 2]; 2] {
+        let n = self.n;
+        let at = |k: u32| match edge {
+            0 => [k, 0],
+            1 => [n, k],
+            2 => [n - k, n],
+            _ => [0, n - k],
+        };
+        [at(piece), at(piece + 1)]
+    }
+
+    fn vertex(&self, face: usize, [i, j]: [u32; 2]) -> u32 {
+        self.points[face][(j * (self.n + 1) + i) as usize]
+    }
+
+    /// The vertices that lie within pieces of edges which have no counterpart.
+    ///
+    /// * `error`: how far a point of a piece may be from its chord.
+    fn ends_within(&self, error: f64) -> Within {
+        let (n, faces) = (self.n, self.faces.len());
+        let pieces = || {
+            let edges = (0..faces).flat_map(|face| (0..4).map(move |edge| (face, edge)));
+            edges.flat_map(|(face, edge)| (0..n).map(move |k| (face, edge, k)))
+        };
+        let vertices = |(face, edge, k): Piece| {
+            let [a, b] = self.ends(edge, k).map(|at| self.vertex(face, at));
+            let turned = self.faces[face].outward < 0;
+            if turned { [b, a] } else { [a, b] }
+        };
+        // Once in each direction makes 0.
+        let mut uses: HashMap<[u32; 2], i32> = HashMap::new();
+        for piece in pieces() {
+            let [a, b] = vertices(piece);
+            *uses.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+        }
+        let single: Vec<Piece> = pieces()
+            .filter(|&piece| {
+                let [a, b] = vertices(piece);
+                a != b && uses[&[a.min(b), a.max(b)]] != 0
+            })
+            .collect();
+        let points = &self.welded.points;
+        let mut ends: Vec<u32> = single.iter().flat_map(|&piece| vertices(piece)).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        // Along a direction in which points of different edges rarely tie.
+        let along = DVec3::new(0.618_033_988, 0.414_213_562, 0.324_717_957).normalize();
+        let mut keyed: Vec<(f64, u32)> = (ends.into_iter())
+            .map(|v| (points[v as usize].dot(along), v))
+            .collect();
+        keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let found = single.into_par_iter().filter_map(|piece| {
+            let (face, edge, k) = piece;
+            let places = self.ends(edge, k);
+            let [a, b] = places.map(|at| self.vertex(face, at));
+            let [from, to] = [a, b].map(|v| points[v as usize]);
+            let middle = 0.5 * (from + to);
+            let radius = 0.5 * from.distance(to) + error + self.welded.hair;
+            let key = middle.dot(along);
+            let first = keyed.partition_point(|(k, _)| *k < key - radius);
+            let near = keyed[first..].iter();
+            let mut within: Vec<(f64, u32)> = near
+                .take_while(|(k, _)| *k <= key + radius)
+                .filter(|(_, v)| *v != a && *v != b)
+                .filter(|(_, v)| points[*v as usize].distance(middle) <= radius)
+                .filter_map(|&(_, v)| Some((self.place_on(face, places, points[v as usize])?, v)))
+                .collect();
+            within.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let list: Vec<u32> = within.into_iter().map(|(_, v)| v).collect();
+            (!list.is_empty()).then_some((piece, list))
+        });
+        found.collect()
+    }
+
+    /// Where between two places of a face's edge a point lies, as a share; `None` where it is off it.
+    fn place_on(&self, face: usize, places: [[u32; 2]; 2], point: DVec3) -> Option<f64> {
+        const STEPS: usize = 32;
+        let surface = &self.faces[face].surface;
+        let [from, to] = places.map(|at| at.map(|k| f64::from(k) / f64::from(self.n)));
+        let direction = [to[0] - from[0], to[1] - from[1]];
+        let mut share = 0.5;
+        // Gauss and Newton's: a piece is nearly straight.
+        for _ in 0..STEPS {
+            let at = [0, 1].map(|k| from[k] + share * direction[k]);
+            let found = surface.derivatives(at).ok()?;
+            let off = point - DVec3::from_array(found.point);
+            let slope = (0..2)
+                .map(|k| DVec3::from_array(found.first[k]) * direction[k])
+                .sum::<DVec3>();
+            let step = off.dot(slope) / slope.length_squared();
+            if !step.is_finite() {
+                return None;
+            }
+            let next = (share + step).clamp(0.0, 1.0);
+            if (next - share).abs() <= f64::EPSILON {
+                break;
+            }
+            share = next;
+        }
+        let at = [0, 1].map(|k| from[k] + share * direction[k]);
+        let near = point_of(&self.faces[face], at).distance(point) <= self.welded.hair;
+        (near && share > 0.0 && share < 1.0).then_some(share)
+    }
+
+    /// All triangles, with the points that pieces of edges take in.
+    fn triangles(&self, within: &Within) -> Vec<[u32; 3]> {
+        let n = self.n;
+        let mut triangles = Vec::new();
+        for (number, face) in self.faces.iter().enumerate() {
+            let mut add = |[a, b, c]: [u32; 3]| {
                 // Where an edge is collapsed a triangle is.
                 if a != b && b != c && c != a {
-                    triangles.push(if face.outward >= 0 {
+                    let turned = if face.outward >= 0 {
                         [a, b, c]
                     } else {
                         [a, c, b]
-                    });
+                    };
+                    triangles.push(turned);
+                }
+            };
+            let at = |i: u32, j: u32| self.vertex(number, [i, j]);
+            let inner = |edge: u32, piece: u32| {
+                let list = within.get(&(number, edge, piece));
+                list.map_or(&[][..], Vec::as_slice)
+            };
+            for j in 0..n {
+                for i in 0..n {
+                    let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                    let edge = |is: bool, edge: u32, piece: u32| {
+                        if is { inner(edge, piece) } else { &[][..] }
+                    };
+                    let low = edge(j == 0, 0, i);
+                    let right = edge(i + 1 == n, 1, j);
+                    let high = edge(j + 1 == n, 2, n - 1 - i);
+                    let left = edge(i == 0, 3, n - 1 - j);
+                    split([a, b, c], low, right, &mut add);
+                    if high.is_empty() && left.is_empty() {
+                        add([a, c, d]);
+                    } else {
+                        split([c, d, a], high, left, &mut add);
+                    }
                 }
             }
         }
+        triangles
     }
+}
+
+/// The triangle a, b, c with further points on its edges from a to b and from b to c.
+fn split([a, b, c]: [u32; 3], first: &[u32], second: &[u32], add: &mut impl FnMut([u32; 3])) {
+    let mut last = a;
+    for &p in first {
+        add([last, p, c]);
+        last = p;
+    }
+    // What is left is last, b, c.
+    let mut from = b;
+    for &q in second {
+        add([last, from, q]);
+        from = q;
+    }
+    add([last, from, c]);
+}
+
+fn point_of(face: &OuterFace, at: [f64; 2]) -> DVec3 {
+    let found = face.surface.evaluate(at);
+    found.map_or(DVec3::ZERO, DVec3::from_array)
 }
 
 /// The largest deviation of n × n cells' triangles from the faces.

@@ -19,7 +19,8 @@
 //!   than [`BOXES`] of them for a cell, fewer for high degrees; what is still open then is
 //!   *undecided*, with the box that is. That happens where the determinant touches zero inside a
 //!   cell without a change of sign along a curve or surface, and for degrees whose expansion takes
-//!   more than [`MOST_WORK`] multiplications.
+//!   more than [`MOST_WORK`] multiplications. There the determinant is evaluated at Gauss's points,
+//!   where two signs prove a fold.
 //! * Source: J. Garloff, *The Bernstein algorithm*, Interval Computations 2 (1993) 154–168.
 
 use super::jacobian::{Bounded, CellNet, Expansion, cost};
@@ -38,6 +39,9 @@ const COEFFICIENTS: usize = 1 << 22;
 
 /// Multiplications for one expansion, at most: a few seconds.
 const MOST_WORK: f64 = 4e9;
+
+/// Share of the product of the derivatives' lengths below which a determinant may be rounding.
+const ROUNDED: f64 = 1e-9;
 
 /// Whether a volume's parameters run like the axes of a right-handed or a left-handed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -266,6 +270,12 @@ impl NurbsVolume {
                 std::array::from_fn(|k| (start[k] + t[k] * (end[k] - start[k])).min(end[k]))
             };
             let sign = match sign(&cell) {
+                JacobianSign::Undecided { start: a, end: b } => self
+                    .fold_at_points([start, end])
+                    .unwrap_or(JacobianSign::Undecided {
+                        start: place(a),
+                        end: place(b),
+                    }),
                 JacobianSign::Positive { at } => JacobianSign::Positive { at: place(at) },
                 JacobianSign::Negative { at } => JacobianSign::Negative { at: place(at) },
                 JacobianSign::Flat => JacobianSign::Flat,
@@ -273,15 +283,44 @@ impl NurbsVolume {
                     positive: place(positive),
                     negative: place(negative),
                 },
-                JacobianSign::Undecided { start, end } => JacobianSign::Undecided {
-                    start: place(start),
-                    end: place(end),
-                },
             };
             Ok((sign, (start, end)))
         });
         signs.collect()
     }
+
+    /// A fold that shows at Gauss's points of a cell, as many in each direction as the degree and one
+    /// more, ten at most.
+    fn fold_at_points(&self, [start, end]: [[f64; 3]; 2]) -> Option<JacobianSign> {
+        let points = self.degrees().map(|p| gauss_points((p + 1).min(10)));
+        let mut seen = Seen::default();
+        for index in indices(points.each_ref().map(Vec::len)) {
+            let at = std::array::from_fn(|k| {
+                (start[k] + points[k][index[k]] * (end[k] - start[k])).min(end[k])
+            });
+            let found = self.jacobian(at).ok()?;
+            let size: f64 = (found.columns.iter())
+                .map(|c| c.iter().map(|x| x * x).sum::<f64>().sqrt())
+                .product();
+            // Far above the rounding of a sum of (p + 1)^3 terms, and of their products.
+            if found.determinant.abs() > ROUNDED * size {
+                seen.note(found.determinant, at);
+            }
+        }
+        match seen {
+            Seen {
+                positive: Some(positive),
+                negative: Some(negative),
+            } => Some(JacobianSign::Folded { positive, negative }),
+            _ => None,
+        }
+    }
+}
+
+/// Gauss's points on [0, 1].
+fn gauss_points(count: usize) -> Vec<f64> {
+    let nodes = crate::math::gauss::nodes(count);
+    nodes.iter().map(|(at, _)| at.f64()).collect()
 }
 
 /// A box of the cell's parameters and the expansion over it.

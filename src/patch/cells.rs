@@ -15,7 +15,7 @@
 //! * Source: L. Ramshaw, *Blossoms are polar forms*, CAGD 6 (1989); Piegl & Tiller, §5.3.
 
 use super::leaf::{self, Leaf, Tree};
-use super::net::Counts;
+use super::net::{self, Counts};
 use super::shared::{self, Face};
 use super::turned::TurnedSet;
 use crate::math::tolerance::{U, gamma};
@@ -87,7 +87,8 @@ impl Cells {
     /// over their certified parts.
     ///
     /// The solid is the union of the volumes' images; volumes may overlap, and either orientation
-    /// will do. Faces of different cells that are the same to 4 eps (size + |P|) are interior.
+    /// will do. Faces of different cells that are the same to 4 eps (size + |P|) are interior. Cells
+    /// whose Jacobian determinant is zero throughout have no inside, and are left out.
     ///
     /// # Errors
     /// [`NurbsError::ControlPoint`] when the control points are too far apart for f64.
@@ -213,7 +214,7 @@ impl Frame {
         Ok(Self {
             centre,
             inverse_unit,
-            tolerance: 4.0 * f64::EPSILON * (2.0 * half + far) * inverse_unit,
+            tolerance: shared::tolerance(half, far) * inverse_unit,
         })
     }
 }
@@ -250,25 +251,26 @@ fn extract(volume: usize, v: &NurbsVolume, frame: &Frame, cells: &mut Vec<Cell>)
             .collect();
     }
     let spans = v.knots().each_ref().map(|k| k.spans().count());
-    for (index, slab) in slabs.into_iter().enumerate() {
-        let place = [
-            index % spans[0],
-            index / spans[0] % spans[1],
-            index / spans[0] / spans[1],
-        ];
-        let face = |k: usize, side: usize| {
-            let edge = if side == 0 { 0 } else { spans[k] - 1 };
-            if place[k] == edge {
-                Face::Outer
-            } else {
-                Face::Shared(shared::LEAST_SLACK)
+    let strides = [1, spans[0], spans[0] * spans[1]];
+    let made: Vec<Cell> = (slabs.into_iter())
+        .map(|slab| Cell::new(volume, slab, [[Face::Outer; 2]; 3]))
+        .collect();
+    let flat: Vec<bool> = made.par_iter().map(Cell::is_flat).collect();
+    for (index, mut cell) in made.into_iter().enumerate() {
+        if flat[index] {
+            continue;
+        }
+        for k in 0..3 {
+            let place = index / strides[k] % spans[k];
+            // What is behind a flat cell is found as the neighbour of another volume is.
+            if place > 0 && !flat[index - strides[k]] {
+                cell.faces[k][0] = Face::Shared(shared::LEAST_SLACK);
             }
-        };
-        cells.push(Cell::new(
-            volume,
-            slab,
-            std::array::from_fn(|k| [face(k, 0), face(k, 1)]),
-        ));
+            if place + 1 < spans[k] && !flat[index + strides[k]] {
+                cell.faces[k][1] = Face::Shared(shared::LEAST_SLACK);
+            }
+        }
+        cells.push(cell);
     }
 }
 
@@ -297,6 +299,56 @@ impl Cell {
             exact_noise: 2.0 * operations * (-102.0_f64).exp2(),
         }
     }
+
+    /// Whether the Jacobian determinant is zero, but for rounding, on as many points as its numerator
+    /// has coefficients.
+    fn is_flat(&self) -> bool {
+        let points = self.counts.map(|n| 3 * (n - 1) + 1);
+        let at = |index: usize| {
+            let digits = [
+                index % points[0],
+                index / points[0] % points[1],
+                index / points[0] / points[1],
+            ];
+            // Off the ends, where maps are singular on purpose; from the middle on.
+            std::array::from_fn(|k| {
+                let digit = (digits[k] + points[k] / 2) % points[k];
+                #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
+                let share = (digit as f64 + 0.5) / points[k] as f64;
+                share
+            })
+        };
+        let count = points.iter().product();
+        let solid = |t: [f64; 3]| {
+            turns(&self.net, self.counts, t, self.noise)
+                || turns(&self.exact, self.counts, t.map(Dd::of), self.exact_noise)
+        };
+        !(0..count).any(|index| solid(at(index)))
+    }
+}
+
+/// Whether the determinant of the derivatives at `t` is more than what rounding makes.
+fn turns<T: Real>(net: &[[T; 4]], counts: Counts, t: [T; 3], noise: f64) -> bool {
+    let h = net::value_and_slopes(net, counts, t);
+    let w = h[0][3];
+    let slopes: [[f64; 3]; 3] = std::array::from_fn(|k| {
+        std::array::from_fn(|c| ((h[k + 1][c] - h[0][c] / w * h[k + 1][3]) / w).f64())
+    });
+    let [u, v, s] = slopes.map(DVec3::from_array);
+    let lengths = [u, v, s].map(DVec3::length);
+    // A derivative is a difference of p coefficients.
+    #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
+    let off = counts.map(|n| 8.0 * n as f64 * noise / w.f64());
+    let bound: f64 = (0..3)
+        .map(|k| {
+            let [a, b] = [
+                lengths[(k + 1) % 3] + off[(k + 1) % 3],
+                lengths[(k + 2) % 3] + off[(k + 2) % 3],
+            ];
+            off[k] * a * b
+        })
+        .sum();
+    u.cross(v).dot(s).abs() > bound + 16.0 * U * lengths.iter().product::<f64>()
 }
 
 /// The parts of a slab on the spans of one direction.

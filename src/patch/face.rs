@@ -15,8 +15,8 @@
 //! * Collapsed: X_a × X_b vanishes on as many points as its numerator has coefficients, to 1e-12 of
 //!   the unit times the face's own extent.
 //! * Shared: equal control nets after raising degrees, in one of the eight orders of a square net,
-//!   points to 1e-12 of the unit and weights up to a common factor; see
-//!   [`pair_off`]. Faces whose knots do not match are cut at each
+//!   points to 4 eps (size + |P|), as those of cells are, and weights up to a common factor, with the
+//!   solid on opposite sides; see [`pair_off`]. Faces whose knots do not match are cut at each
 //!   other's corners first.
 //! * Limits: volumes that overlap, or touch in faces that are not the same map up to an affine change
 //!   of parameters, keep their faces.
@@ -25,12 +25,16 @@
 
 use super::face_match::pair_off;
 use super::face_net::{Net, Point4, cartesian, cross, dot, length, minus, real};
+use super::shared;
 use crate::nurbs::{
     BezierCell, Homogeneous, KnotVector, NurbsError, NurbsVolume, clamp, refine_knots,
 };
 use glam::DVec3;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
-/// Share of the unit below which points coincide.
+/// Share of the unit below which a face may meet another, or is none; whether two are one is decided
+/// by the frame's tolerance.
 pub(super) const COINCIDE: f64 = 1e-12;
 
 /// Where a solid is: its middle, and a power of two near half its longest side.
@@ -38,6 +42,8 @@ pub(super) const COINCIDE: f64 = 1e-12;
 pub(super) struct Frame {
     pub(super) centre: DVec3,
     pub(super) unit: f64,
+    /// Distance below which points of two nets count as one, in units.
+    pub(super) tolerance: f64,
 }
 
 impl Frame {
@@ -65,18 +71,22 @@ impl Frame {
             return Self {
                 centre: DVec3::ZERO,
                 unit: 1.0,
+                tolerance: 0.0,
             };
         }
         let half = (0.5 * high - 0.5 * low).max_element();
+        let far = low.abs().max(high.abs()).max_element();
         let exponent = half.log2().ceil();
+        // A point has no size; any unit will do.
+        let unit = if exponent.is_finite() {
+            exponent.clamp(-1000.0, 1000.0).exp2()
+        } else {
+            1.0
+        };
         Self {
             centre: 0.5 * low + 0.5 * high,
-            // A point has no size; any unit will do.
-            unit: if exponent.is_finite() {
-                exponent.clamp(-1000.0, 1000.0).exp2()
-            } else {
-                1.0
-            },
+            unit,
+            tolerance: shared::tolerance(half, far) / unit,
         }
     }
 }
@@ -129,7 +139,7 @@ impl OuterFace {
 #[derive(Debug, Clone)]
 pub(super) struct Face {
     pub(super) net: Net,
-    outward: i8,
+    pub(super) outward: i8,
     patch: usize,
     cell: [usize; 3],
     parameter: usize,
@@ -177,7 +187,7 @@ pub(super) fn collect(
         faces_of(patch, index, &frame, &mut faces)?;
     }
     faces.retain(|face| !is_collapsed(&face.net));
-    let faces = pair_off(faces);
+    let faces = pair_off(faces, frame.tolerance);
     let published: Result<Vec<_>, _> = faces.iter().map(|face| face.publish(&frame)).collect();
     Ok((
         frame,
@@ -312,6 +322,10 @@ fn faces_of(
         spans
     });
     let degrees = volume.degrees();
+    // One that is one to one has one sign all through; a flat cell has that of the others.
+    let whole = whole_sign(&volume, &spans)?;
+    // Cells at edges have several faces.
+    let mut signs: HashMap<[usize; 3], i8> = HashMap::new();
     for parameter in 0..3 {
         let [a, b] = others(parameter);
         for end in [End::First, End::Last] {
@@ -334,9 +348,15 @@ fn faces_of(
                             points.push([p, q, r, h.weight] as Point4);
                         }
                     }
-                    let boxed = std::array::from_fn(|k| spans[k][cell[k]]);
                     let [first, last] = spans[parameter][span];
-                    let sign = jacobian_sign(&volume, boxed)?;
+                    let sign = match signs.entry(cell) {
+                        Entry::Occupied(known) => *known.get(),
+                        Entry::Vacant(place) => {
+                            let boxed = std::array::from_fn(|k| spans[k][cell[k]]);
+                            let sign = jacobian_sign(&volume, boxed)?;
+                            *place.insert(if sign == 0 { whole } else { sign })
+                        }
+                    };
                     faces.push(Face {
                         net: Net {
                             degrees: [degrees[a], degrees[b]],
@@ -358,6 +378,21 @@ fn faces_of(
         }
     }
     Ok(())
+}
+
+/// The sign of det [X_u X_v X_w] in the first cell that is not flat.
+fn whole_sign(volume: &NurbsVolume, spans: &[Vec<[f64; 2]>; 3]) -> Result<i8, NurbsError> {
+    for &w in &spans[2] {
+        for &v in &spans[1] {
+            for &u in &spans[0] {
+                let sign = jacobian_sign(volume, [u, v, w])?;
+                if sign != 0 {
+                    return Ok(sign);
+                }
+            }
+        }
+    }
+    Ok(0)
 }
 
 /// The sign of det [X_u X_v X_w] in a cell: that of its integral by Gauss's rule of three points.

@@ -8,8 +8,13 @@
 //! in the parameters of both. Its corners are corners of one piece or the other, so each piece is
 //! cut at the parameters of the other's corners and the parts are compared.
 //!
-//! * Accuracy: points to [`COINCIDE`] of the unit, weights to the same share.
-//! * Cost: pieces are compared when their corners' sums, or their boxes, meet.
+//! The solid must lie on opposite sides of the two: volumes that overlap and have a face in common on
+//! the same side (a patch given twice, say) are both bounded by it.
+//!
+//! * Accuracy: points to [`tolerance`](super::shared::tolerance), weights to the same share; where to
+//!   cut is proposed more generously, within [`COINCIDE`].
+//! * Cost: pieces are compared when their corners' sums, or their boxes, meet; boxes are swept along
+//!   the longest side of all.
 
 use super::distance::locate;
 use super::face::{COINCIDE, Face};
@@ -17,9 +22,9 @@ use super::face_net::{Net, cartesian, length, minus};
 use super::face_tree::PatchTree;
 use smallvec::SmallVec;
 
-/// Faces without those that coincide with another.
-pub(super) fn pair_off(faces: Vec<Face>) -> Vec<Face> {
-    cut_and_pair(drop_equal(faces))
+/// Faces without those that coincide with another, points to `tolerance` units.
+pub(super) fn pair_off(faces: Vec<Face>, tolerance: f64) -> Vec<Face> {
+    cut_and_pair(drop_equal(faces, tolerance), tolerance)
 }
 
 fn corners(net: &Net) -> [[f64; 3]; 4] {
@@ -27,12 +32,12 @@ fn corners(net: &Net) -> [[f64; 3]; 4] {
     [(0, 0), (p, 0), (0, q), (p, q)].map(|(i, j)| cartesian(net.points[net.at(i, j)]))
 }
 
-fn coincide(a: [f64; 3], b: [f64; 3]) -> bool {
-    length(minus(a, b)) <= COINCIDE
+fn coincide(a: [f64; 3], b: [f64; 3], tolerance: f64) -> bool {
+    length(minus(a, b)) <= tolerance
 }
 
 /// Drops pairs of equal faces.
-fn drop_equal(faces: Vec<Face>) -> Vec<Face> {
+fn drop_equal(faces: Vec<Face>, tolerance: f64) -> Vec<Face> {
     /// A direction in which different faces rarely tie.
     const MIX: [f64; 3] = [0.618_033_988, 0.414_213_562, 0.324_717_957];
     let mut keys: Vec<(f64, usize)> = (faces.iter().enumerate())
@@ -50,12 +55,13 @@ fn drop_equal(faces: Vec<Face>) -> Vec<Face> {
         if dropped[index] {
             continue;
         }
-        // Four corners, each off by the tolerance at most.
+        // Four corners, each off by the tolerance at most, and the rounding of their sum.
+        let most = 8.0 * tolerance + 64.0 * f64::EPSILON;
         let near = keys[place + 1..]
             .iter()
-            .take_while(|(other, _)| other - key <= 8.0 * COINCIDE);
+            .take_while(|(other, _)| other - key <= most);
         for &(_, other) in near {
-            if !dropped[other] && is_same(&faces[index].net, &faces[other].net) {
+            if !dropped[other] && meet(&faces[index], &faces[other], tolerance) {
                 (dropped[index], dropped[other]) = (true, true);
                 break;
             }
@@ -72,11 +78,22 @@ fn keep(faces: Vec<Face>, dropped: &[bool]) -> Vec<Face> {
         .collect()
 }
 
-/// Whether two nets are one surface, up to the order of their parameters and a factor of the
+/// Whether two faces are one surface with the solid on opposite sides of it.
+fn meet(a: &Face, b: &Face, tolerance: f64) -> bool {
+    let ways = (0..8_u8).filter(|way| {
+        // Each exchange and each reversal of parameters turns the normal round. A face of what is
+        // flat throughout has no side.
+        let turned = if way.count_ones() % 2 == 0 { 1 } else { -1 };
+        a.outward * b.outward * turned <= 0
+    });
+    is_same(&a.net, &b.net, ways, tolerance)
+}
+
+/// Whether two nets are one surface in one of the `ways` to lay the parameters, up to a factor of the
 /// weights.
-fn is_same(a: &Net, b: &Net) -> bool {
+fn is_same(a: &Net, b: &Net, ways: impl Iterator<Item = u8>, tolerance: f64) -> bool {
     let ends = corners(a);
-    for way in 0..8 {
+    for way in ways {
         // Corners first: they rule out nearly every way.
         let from = corners(b);
         let laid = |i: usize, j: usize| {
@@ -89,7 +106,7 @@ fn is_same(a: &Net, b: &Net) -> bool {
             }
             if way & 1 == 0 { i + 2 * j } else { j + 2 * i }
         };
-        let fits = |i: usize, j: usize| coincide(ends[i + 2 * j], from[laid(i, j)]);
+        let fits = |i: usize, j: usize| coincide(ends[i + 2 * j], from[laid(i, j)], tolerance);
         if !(fits(0, 0) && fits(1, 0) && fits(0, 1) && fits(1, 1)) {
             continue;
         }
@@ -98,7 +115,8 @@ fn is_same(a: &Net, b: &Net) -> bool {
         let (a, b) = (a.elevated(degrees), b.elevated(degrees));
         let factor = b.points[0][3] / a.points[0][3];
         let same = a.points.iter().zip(&b.points).all(|(&p, &q)| {
-            (q[3] - factor * p[3]).abs() <= COINCIDE * q[3] && coincide(cartesian(p), cartesian(q))
+            (q[3] - factor * p[3]).abs() <= tolerance * q[3]
+                && coincide(cartesian(p), cartesian(q), tolerance)
         });
         if same {
             return true;
@@ -110,16 +128,21 @@ fn is_same(a: &Net, b: &Net) -> bool {
 /// A face with what is needed to find points on it, made when first asked for.
 struct Candidate {
     face: Face,
+    /// Which of the faces given it is, or is a part of.
+    origin: usize,
+    whole: bool,
     low: [f64; 3],
     high: [f64; 3],
     tree: Option<PatchTree>,
 }
 
 impl Candidate {
-    fn new(face: Face) -> Self {
+    fn new(face: Face, origin: usize, whole: bool) -> Self {
         let (low, high) = face.net.bounds();
         Self {
             face,
+            origin,
+            whole,
             low,
             high,
             tree: None,
@@ -142,7 +165,7 @@ impl Candidate {
         for corner in corners(other) {
             let outside = (0..3)
                 .any(|c| corner[c] < self.low[c] - COINCIDE || corner[c] > self.high[c] + COINCIDE);
-            if outside || own.iter().any(|&x| coincide(x, corner)) {
+            if outside || own.iter().any(|&x| coincide(x, corner, COINCIDE)) {
                 continue;
             }
             let face = &self.face.net;
@@ -186,40 +209,87 @@ impl Candidate {
 type Cuts = SmallVec<[f64; 4]>;
 
 /// Cuts faces that share a part with another and drops those parts.
-fn cut_and_pair(faces: Vec<Face>) -> Vec<Face> {
-    let mut waiting: Vec<Candidate> = faces.into_iter().rev().map(Candidate::new).collect();
-    let mut done: Vec<Candidate> = Vec::new();
+fn cut_and_pair(faces: Vec<Face>, tolerance: f64) -> Vec<Face> {
+    let mut waiting: Vec<Candidate> = (faces.into_iter().enumerate())
+        .map(|(origin, face)| Candidate::new(face, origin, true))
+        .collect();
+    let near = neighbours(&waiting);
+    waiting.reverse();
+    let mut done: Vec<Option<Candidate>> = Vec::new();
+    // Places in `done` of what is left of each face.
+    let mut left: Vec<SmallVec<[usize; 1]>> = vec![SmallVec::new(); waiting.len()];
     // Each success removes a common part of two faces, so there is an end; this many bounds it
     // against parts that rounding keeps producing.
     let mut budget = 16 * waiting.len() + 256;
+    let mut others: Vec<usize> = Vec::new();
     'next: while let Some(mut one) = waiting.pop() {
-        for index in 0..done.len() {
-            if budget == 0 || !one.meets(&done[index]) {
+        others.clear();
+        let around = near[one.origin].iter().chain([&one.origin]);
+        others.extend(around.flat_map(|&origin| &left[origin]));
+        others.sort_unstable();
+        for &index in &others {
+            let Some(other) = &mut done[index] else {
+                continue;
+            };
+            if budget == 0 || !one.meets(other) {
                 continue;
             }
-            let ours = one.cuts(&done[index].face.net);
-            let theirs = done[index].cuts(&one.face.net);
-            // Nothing to cut: the parts are the faces themselves, and cutting others may have made
+            let (ours, theirs) = (one.cuts(&other.face.net), other.cuts(&one.face.net));
+            let uncut = |cuts: &[Cuts; 2]| cuts.iter().all(Cuts::is_empty);
+            if one.whole && other.whole && uncut(&ours) && uncut(&theirs) {
+                // They have been compared.
+                continue;
+            }
+            // Where nothing is cut the parts are the faces themselves: cutting others may have made
             // them equal.
-            let (a, b) = (one.parts(&ours), done[index].parts(&theirs));
+            let (a, b) = (one.parts(&ours), other.parts(&theirs));
             let mut gone = [vec![false; a.len()], vec![false; b.len()]];
             for i in 0..a.len() {
-                let equal = (0..b.len()).find(|&j| !gone[1][j] && is_same(&a[i].net, &b[j].net));
+                let equal = (0..b.len()).find(|&j| !gone[1][j] && meet(&a[i], &b[j], tolerance));
                 if let Some(j) = equal {
                     (gone[0][i], gone[1][j]) = (true, true);
                 }
             }
             if gone[0].contains(&true) {
                 budget -= 1;
-                done.swap_remove(index);
-                waiting.extend(keep(b, &gone[1]).into_iter().map(Candidate::new));
-                waiting.extend(keep(a, &gone[0]).into_iter().map(Candidate::new));
+                let origin = other.origin;
+                done[index] = None;
+                left[origin].retain(|i| *i != index);
+                let part = |origin| move |face| Candidate::new(face, origin, false);
+                waiting.extend(keep(b, &gone[1]).into_iter().map(part(origin)));
+                waiting.extend(keep(a, &gone[0]).into_iter().map(part(one.origin)));
                 continue 'next;
             }
         }
-        done.push(one);
+        left[one.origin].push(done.len());
+        done.push(Some(one));
     }
-    done.into_iter().map(|candidate| candidate.face).collect()
+    let done = done.into_iter().flatten();
+    done.map(|candidate| candidate.face).collect()
+}
+
+/// For each face the others whose boxes meet its own.
+fn neighbours(faces: &[Candidate]) -> Vec<Vec<usize>> {
+    let extent = |k: usize| {
+        let low = faces.iter().fold(f64::INFINITY, |m, f| m.min(f.low[k]));
+        let high = (faces.iter()).fold(f64::NEG_INFINITY, |m, f| m.max(f.high[k]));
+        high - low
+    };
+    let axis = (1..3).fold(0, |a, b| if extent(b) > extent(a) { b } else { a });
+    let mut order: Vec<usize> = (0..faces.len()).collect();
+    order.sort_by(|&a, &b| faces[a].low[axis].total_cmp(&faces[b].low[axis]));
+    let mut near = vec![Vec::new(); faces.len()];
+    for (place, &a) in order.iter().enumerate() {
+        let end = faces[a].high[axis] + COINCIDE;
+        let after = order[place + 1..].iter();
+        for &b in after.take_while(|&&b| faces[b].low[axis] <= end) {
+            if faces[a].meets(&faces[b]) {
+                near[a].push(b);
+                near[b].push(a);
+            }
+        }
+    }
+    near
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@
 //! * Tolerance: 4 eps (size + |P|), the rounding of two nets that were computed in different ways. A
 //!   gap or an overlap of that width inside a solid is no boundary; a wider one is.
 //! * Limits: the degrees of two faces must agree, and a face covered by several smaller ones is not
-//!   found. There both faces stay outer, and a point on them is `On` instead of `Inside`.
+//!   found. There both faces stay outer, and a point on them is `On` instead of `Inside`; who has the
+//!   outer faces of all ([`FaceSet`](super::FaceSet)) tells by its distance from them.
 
 use super::cells::Cell;
 use super::net::{self, value};
@@ -26,6 +27,14 @@ pub(super) enum Face {
 /// The gap that neighbours in one volume may have: some roundings of double-double.
 pub(super) const LEAST_SLACK: f64 = 1.0 / (1_u128 << 86) as f64;
 
+/// Distance below which points of two nets count as one: the rounding of nets that were computed in
+/// different ways. Cells and outer faces take the same, so that they agree on what is one face.
+///
+/// * `half`: half of the longest side of all control points' bounds; `far`: their largest coordinate.
+pub(super) fn tolerance(half: f64, far: f64) -> f64 {
+    4.0 * f64::EPSILON * (2.0 * half + far)
+}
+
 /// A face that may turn out to be shared.
 struct Candidate {
     cell: usize,
@@ -35,6 +44,7 @@ struct Candidate {
     /// Points and weight, the weight divided by the largest.
     points: Vec<[f64; 4]>,
     middle: [f64; 3],
+    key: f64,
 }
 
 /// Sorts the faces of all cells that are not inside their volume.
@@ -55,12 +65,13 @@ pub(super) fn classify(cells: &mut [Cell], tolerance: f64) {
             }
         }
     }
-    // Middles of equal faces differ by the tolerance at most, so a sweep finds the pairs.
-    candidates.sort_by(|a, b| a.middle[0].total_cmp(&b.middle[0]));
+    // Middles of equal faces differ by the tolerance at most, so a sweep finds the pairs: in a
+    // direction, of length below 1, in which the middles of different faces rarely tie.
+    candidates.sort_by(|a, b| a.key.total_cmp(&b.key));
     let mut taken = vec![false; candidates.len()];
     for (i, a) in candidates.iter().enumerate() {
         for (j, b) in candidates.iter().enumerate().skip(i + 1) {
-            if b.middle[0] - a.middle[0] > 2.0 * tolerance || taken[i] {
+            if b.key - a.key > 2.0 * tolerance + 4.0 * f64::EPSILON || taken[i] {
                 break;
             }
             if taken[j] {
@@ -96,13 +107,15 @@ impl Candidate {
                 high[k] = high[k].max(p[k]);
             }
         }
+        let middle: [f64; 3] = std::array::from_fn(|k| 0.5 * (low[k] + high[k]));
         Self {
             cell: index,
             axis,
             side,
             counts,
             points,
-            middle: std::array::from_fn(|k| 0.5 * (low[k] + high[k])),
+            middle,
+            key: 0.618_033_988 * middle[0] + 0.414_213_562 * middle[1] + 0.324_717_957 * middle[2],
         }
     }
 

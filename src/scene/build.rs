@@ -111,15 +111,21 @@ impl Scene {
                 SolidKind::Volume(volume) => {
                     let notes = volume.notes.iter();
                     warnings.extend(notes.map(|n| format!("{}: {n}", solid.path)));
-                    let part = nets::part(&model, solid, volume)?;
+                    let part = nets::part(&model, solid, volume, &mut warnings)?;
                     if let Body::Patches(patches) = &**part.body()
                         && let Some(([first, later], [x, y, z])) =
                             patches.overlap().map(|(pair, at)| (pair, at.to_array()))
                     {
-                        warnings.push(format!(
-                            "{}: patches {first} and {later} overlap, at [{x}, {y}, {z}] for one: each is measured and bounded by itself; make them solids of their own",
-                            solid.path
-                        ));
+                        let what = if first == later {
+                            format!(
+                                "patch {first} overlaps itself, at [{x}, {y}, {z}] for one: what is held twice is measured twice, and bounded in between; split it over solids of their own"
+                            )
+                        } else {
+                            format!(
+                                "patches {first} and {later} overlap, at [{x}, {y}, {z}] for one: each is measured and bounded by itself; make them solids of their own"
+                            )
+                        };
+                        warnings.push(format!("{}: {what}", solid.path));
                     }
                     part
                 }
@@ -374,7 +380,7 @@ fn loops(profile: &ProfileModel) -> Vec<&[CurveModel]> {
         .collect()
 }
 
-fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
+pub(super) fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
     let loops: Vec<ProfileLoop> = loops(profile)
         .into_iter()
         .map(|l| l.iter().map(curve).collect())
@@ -460,7 +466,11 @@ pub(super) fn curve(curve: &CurveModel) -> ProfileCurve {
 }
 
 /// A region's error at its place in the scene.
-fn placed(model: &SceneModel, profile: &ProfileModel, error: &RegionError) -> SceneError {
+pub(super) fn placed(
+    model: &SceneModel,
+    profile: &ProfileModel,
+    error: &RegionError,
+) -> SceneError {
     let loops = loops(profile);
     let curve_at = |l: usize, c: usize| loops.get(l).and_then(|curves| curves.get(c));
     let name = |l: usize, c: usize| curve_at(l, c).map_or_else(String::new, |c| c.path.clone());

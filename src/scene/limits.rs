@@ -44,6 +44,14 @@ pub const MIN_SINE: f64 = 1e-9;
 /// millisecond each to prepare.
 pub const MAX_CELLS: usize = 100_000;
 
+/// Bézier coefficients of one volume, all cells of all patches together: a cell of degree 32 has 35 937
+/// of them, of some hundred bytes each, whatever few control points it came from.
+pub const MAX_COEFFICIENTS: usize = 1 << 23;
+
+/// Ratio of the largest to the least weight of one Bézier cell. Beyond it the rounding of the largest,
+/// times a point near the least, is more than the distances asked for.
+pub(super) const MAX_WEIGHT_RATIO: f64 = 1e12;
+
 /// Least length of an ellipsoid or a box as a share of its largest: squares of the quotient keep half of
 /// their digits.
 pub const MIN_ASPECT: f64 = 1e-8;

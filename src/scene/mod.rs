@@ -23,6 +23,7 @@ mod build;
 mod error;
 mod export;
 mod fields;
+mod fold;
 mod json;
 mod keys;
 mod limits;
@@ -47,8 +48,8 @@ pub use error::{InputProblem, Place, SceneError, Sources};
 #[cfg(feature = "cli")]
 pub(crate) use keys::nearest;
 pub use limits::{
-    MAX_CELLS, MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME, MAX_TEXT_BYTES, MAX_VOXELS,
-    MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
+    MAX_CELLS, MAX_COEFFICIENTS, MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME,
+    MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
     AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName, CurveForm,

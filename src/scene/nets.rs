@@ -1,8 +1,9 @@
 //! From the data of a volume to its NURBS.
 
-use super::build::{curve, frame};
+use super::build::{curve, frame, placed, region};
 use super::error::Place;
-use super::limits::MAX_CELLS;
+use super::fold::{self, Fold};
+use super::limits::{MAX_CELLS, MAX_COEFFICIENTS, MAX_WEIGHT_RATIO};
 use super::model::{
     self, CurveForm, PatchModel, ProfileModel, SceneModel, SectionModel, SolidModel, TurnModel,
     VolumeModel, VolumeSource,
@@ -16,17 +17,21 @@ use crate::math::Similarity;
 use crate::math::bernstein;
 use crate::math::{Dd, Real};
 use crate::nurbs::{
-    KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume, OrientationError,
+    CellIndex, JacobianSign, KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume,
+    OrientationError,
 };
-use crate::region::{Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, beziers};
+use crate::region::{
+    Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, RegionError, beziers,
+};
 use crate::solid::{Body, Field, Part, Patches, Turn};
 use std::sync::Arc;
 
-/// The part that a volume is.
+/// The part that a volume is; what a user should know of it goes to `warnings`.
 pub(super) fn part(
     model: &SceneModel,
     solid: &SolidModel,
     volume: &VolumeModel,
+    warnings: &mut Vec<String>,
 ) -> Result<Part, Error> {
     let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
     let maker = Maker { model, solid };
@@ -40,7 +45,7 @@ pub(super) fn part(
             turn,
             union,
         } => {
-            let chain = maker.chain(&model.profiles[*profile].1)?;
+            let chain = maker.chain(&model.profiles[*profile].1, *union)?;
             if let Some(back) = chain.reversal {
                 if !*union {
                     let hint = "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
@@ -51,25 +56,21 @@ pub(super) fn part(
             maker.curve(*form, chain, *turn)?
         }
     };
-    let cells = |v: &NurbsVolume| {
-        v.knots()
-            .iter()
-            .map(|k| k.spans().count())
-            .product::<usize>()
-    };
-    let count = volumes.iter().map(cells).fold(0, usize::saturating_add);
-    if count > MAX_CELLS {
-        let found = format!("{count} Bézier cells");
-        let wanted = format!("at most {MAX_CELLS}: products of the knot spans in u, v and w");
-        return Err(maker.fault("", found, &wanted, Some("use fewer knots".to_owned())));
-    }
+    maker.check_size(&volumes)?;
     for (index, volume) in volumes.iter().enumerate() {
         let (place, key) = match source {
             VolumeSource::Patches(patches) => (patches[index].place, format!(".patches[{index}]")),
             VolumeSource::Section { section, .. } => (section.place, ".section".to_owned()),
             VolumeSource::Curve { .. } => (solid.place, ".profile".to_owned()),
         };
-        maker.check(&key, volume, place)?;
+        let rounding = || match source {
+            VolumeSource::Section { section, .. } => fold::rounding(section.points.iter()),
+            VolumeSource::Patches(patches) => fold::rounding(patches[index].points.iter()),
+            VolumeSource::Curve { .. } => fold::rounding(volume.control_points().iter()),
+        };
+        if let Some(said) = maker.check(&key, volume, place, rounding)? {
+            warnings.push(said);
+        }
     }
     let fields = match source {
         VolumeSource::Patches(patches) => fields(patches, &volumes),
@@ -77,6 +78,15 @@ pub(super) fn part(
     };
     let body = fields.and_then(|fields| Patches::new(&frame, volumes, fields));
     let body = body.map_err(|e| maker.refused(&e.to_string()))?;
+    if body.faces().faces().is_empty() {
+        let key = match source {
+            VolumeSource::Patches(_) => ".patches",
+            VolumeSource::Section { .. } => ".section",
+            VolumeSource::Curve { .. } => ".profile",
+        };
+        let found = "volumes without a face that bounds them".to_owned();
+        return Err(maker.fault(key, found, "volumes that enclose something", None));
+    }
     Ok(Part::new(
         solid.name.clone(),
         solid.material,
@@ -93,7 +103,7 @@ pub(super) fn revolved(
     turn: TurnModel,
 ) -> Result<Vec<NurbsVolume>, Error> {
     let maker = Maker { model, solid };
-    let chain = maker.chain(&model.profiles[profile].1)?;
+    let chain = maker.chain(&model.profiles[profile].1, false)?;
     if let Some(back) = chain.reversal {
         return Err(maker.runs_back(back, "`mesh` writes the boundary of every solid"));
     }
@@ -206,23 +216,108 @@ impl Maker<'_> {
         made.collect()
     }
 
-    /// Refuses a patch that folds.
-    fn check(&self, key: &str, volume: &NurbsVolume, place: Place) -> Result<(), Error> {
-        let Err(error) = volume.orientation() else {
-            return Ok(());
+    /// Refuses what would take too much memory.
+    fn check_size(&self, volumes: &[NurbsVolume]) -> Result<(), Error> {
+        let cells = |v: &NurbsVolume| {
+            let spans = v.knots().iter().map(|k| k.spans().count());
+            spans.fold(1, usize::saturating_mul)
         };
-        // A cell without volume adds nothing, and what could not be settled is not known to fold.
+        let coefficients = |v: &NurbsVolume| {
+            let each = v.degrees().into_iter().map(|p| p + 1).product();
+            cells(v).saturating_mul(each)
+        };
+        let total = |of: &dyn Fn(&NurbsVolume) -> usize| {
+            volumes.iter().map(of).fold(0, usize::saturating_add)
+        };
+        let count = total(&cells);
+        if count > MAX_CELLS {
+            let found = format!("{count} Bézier cells");
+            let wanted = format!("at most {MAX_CELLS}: products of the knot spans in u, v and w");
+            return Err(self.fault("", found, &wanted, Some("use fewer knots".to_owned())));
+        }
+        let count = total(&coefficients);
+        if count > MAX_COEFFICIENTS {
+            let found = format!("{count} Bézier coefficients");
+            let wanted = format!(
+                "at most {MAX_COEFFICIENTS}: for each cell the product of the degrees plus one"
+            );
+            let hint = "use lower degrees or fewer knots".to_owned();
+            return Err(self.fault("", found, &wanted, Some(hint)));
+        }
+        Ok(())
+    }
+
+    /// Refuses a patch that folds, that is flat, or whose weights are too far apart; else what a user
+    /// should know.
+    ///
+    /// * `rounding`: that of the coordinates it was given by, in their own units.
+    fn check(
+        &self,
+        key: &str,
+        volume: &NurbsVolume,
+        place: Place,
+        rounding: impl FnOnce() -> f64,
+    ) -> Result<Option<String>, Error> {
+        let path = format!("{}{key}", self.solid.path);
+        let refused = |found: String, wanted: &str, hint: &str| {
+            let (found, hint) = (Some(found), Some(hint.to_owned()));
+            Err(self.model.error(place, &path, found, wanted, hint).into())
+        };
+        if let Some((cell, [low, high])) = widest_weights(volume)
+            && !(high / low <= MAX_WEIGHT_RATIO)
+        {
+            let found = format!(
+                "weights from {low:e} to {high:e}, a ratio of {:.0e}, in Bézier {cell}",
+                high / low
+            );
+            let wanted = format!("a ratio of at most {MAX_WEIGHT_RATIO:e} in each cell");
+            let hint = "insert knots where the weights change, or bring them nearer to each other";
+            return refused(found, &wanted, hint);
+        }
+        let Err(error) = volume.orientation() else {
+            return Ok(None);
+        };
         match error {
-            OrientationError::Folded { .. } if fold_depth(volume) <= HAIR => Ok(()),
-            OrientationError::Folded { .. } | OrientationError::Nurbs(_) => {
-                let path = format!("{}{key}", self.solid.path);
-                let found = Some(error.to_string());
-                let wanted = "a Jacobian determinant of one sign";
-                let hint = "split the patch where it folds, or move its control points";
-                let hint = Some(hint.to_owned());
-                Err(self.model.error(place, &path, found, wanted, hint).into())
+            OrientationError::Folded {
+                positive,
+                negative,
+                cells,
+            } => {
+                let fold = Fold::new(volume, [positive, negative], cells);
+                if fold.is_rounding(rounding) {
+                    return Ok(Some(format!(
+                        "{path}: folds over itself by the rounding of its control points, a share of {:.0e}, at parameters {negative:?} for one: taken as if it did not",
+                        fold.share()
+                    )));
+                }
+                refused(
+                    error.to_string(),
+                    "a Jacobian determinant of one sign",
+                    "split the patch where it folds, or move its control points",
+                )
             }
-            _ => Ok(()),
+            OrientationError::Nurbs(_) => refused(
+                error.to_string(),
+                "a Jacobian determinant of one sign",
+                "split the patch where it folds, or move its control points",
+            ),
+            OrientationError::Flat { .. } => {
+                let flat = |sign: &JacobianSign| matches!(sign, JacobianSign::Flat);
+                let signs = volume.jacobian_signs().unwrap_or_default();
+                if signs.iter().all(|(sign, _)| flat(sign)) {
+                    return refused(
+                        "a volume that is flat: its Jacobian determinant is zero throughout".into(),
+                        "a patch that fills space",
+                        "move its control points out of the surface they are in, or leave it out",
+                    );
+                }
+                // A cell without volume adds nothing.
+                Ok(None)
+            }
+            // What could not be settled is not known to fold.
+            _ => Ok(Some(format!(
+                "{path}: not proved one to one: {error}; where it folds, answers may be wrong"
+            ))),
         }
     }
 
@@ -244,8 +339,10 @@ impl Maker<'_> {
         })
     }
 
-    /// The chain of a profile, in pieces.
-    fn chain(&self, profile: &ProfileModel) -> Result<Chain, Error> {
+    /// The chain of a profile, in pieces, its gaps closed.
+    ///
+    /// * `union`: its discs are asked for, which may have an area where the profile has none.
+    fn chain(&self, profile: &ProfileModel, union: bool) -> Result<Chain, Error> {
         let wanted = "a profile with boundary = \"to-axis\" and one chain, `curves`";
         let found = match (&profile.curves, profile.boundary) {
             (Some(_), model::Boundary::ToAxis) if profile.loops.is_empty() => None,
@@ -254,6 +351,14 @@ impl Maker<'_> {
         };
         if let Some(found) = found {
             return Err(self.fault(".profile", found.to_owned(), wanted, None));
+        }
+        // What is refused when it is turned as a profile is refused here.
+        match region(profile) {
+            Ok(_) => {}
+            Err(RegionError::NoArea) if union => {}
+            Err(RegionError::NoArea) => return Err(self.encloses_nothing()),
+            Err(RegionError::Tangle { .. }) => {}
+            Err(error) => return Err(placed(self.model, profile, &error).into()),
         }
         let mut pieces = Vec::new();
         for (index, one) in profile.curves.iter().flatten().enumerate() {
@@ -266,6 +371,7 @@ impl Maker<'_> {
                 split_at_extrema(index, bezier.points, &mut pieces);
             }
         }
+        let mut pieces = without_gaps(pieces);
         let rises: Vec<f64> = pieces.iter().map(Piece::rise).collect();
         let first = rises
             .iter()
@@ -278,6 +384,16 @@ impl Maker<'_> {
             pieces = pieces.into_iter().map(Piece::reversed).collect();
         }
         Ok(Chain { pieces, reversal })
+    }
+
+    fn encloses_nothing(&self) -> Error {
+        let found = "a chain that encloses no volume with the axis".to_owned();
+        self.fault(
+            ".profile",
+            found,
+            "a chain along which z rises, or falls, off the axis",
+            None,
+        )
     }
 
     fn runs_back(&self, piece: usize, hint: &str) -> Error {
@@ -313,6 +429,9 @@ impl Maker<'_> {
                 _ => runs.push(vec![piece]),
             }
             broken = false;
+        }
+        if runs.is_empty() {
+            return Err(self.encloses_nothing());
         }
         let radii: Vec<[f64; 2]> = runs
             .iter()
@@ -384,38 +503,84 @@ impl Maker<'_> {
     }
 }
 
-/// Folds whose determinant is below this share of the other sign's largest are those of rounded
-/// decimals, at rims and axes where it would be 0.
-const HAIR: f64 = 1e-5;
-
-/// The least determinant as a share of the largest one of the other sign, on a lattice over every
-/// cell with its corners: a fold of rounding is at a corner or an edge.
-fn fold_depth(volume: &NurbsVolume) -> f64 {
-    const PARTS: u32 = 8;
-    let (mut low, mut high) = (0.0_f64, 0.0_f64);
-    for piece in volume.to_bezier().unwrap_or_default() {
-        for n in 0..(PARTS + 1).pow(3) {
-            let place = |d: u32| f64::from(n / d % (PARTS + 1)) / f64::from(PARTS);
-            let at = [place(1), place(PARTS + 1), place((PARTS + 1).pow(2))];
-            let Ok(jacobian) = volume.jacobian(piece.parameters(at)) else {
-                return f64::INFINITY;
-            };
-            low = low.min(jacobian.determinant);
-            high = high.max(jacobian.determinant);
-        }
+/// The Bézier cell whose weights are furthest apart, with the least and the largest of them; `None`
+/// where all weights of the net are near enough to each other.
+fn widest_weights(volume: &NurbsVolume) -> Option<(CellIndex, [f64; 2])> {
+    let ends = |weights: &mut dyn Iterator<Item = f64>| {
+        weights.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], w| {
+            [low.min(w), high.max(w)]
+        })
+    };
+    // Those of cells are means of the net's.
+    let [low, high] = ends(&mut volume.weights().iter().copied());
+    if high / low <= MAX_WEIGHT_RATIO {
+        return None;
     }
-    let share = low.abs().min(high) / low.abs().max(high);
-    if share.is_finite() {
-        share
-    } else {
-        f64::INFINITY
-    }
+    let spans = volume.knots().each_ref().map(|k| k.spans().count());
+    let pieces = volume.to_bezier().ok()?;
+    let each = pieces.iter().enumerate().map(|(number, piece)| {
+        let [a, b, _] = spans;
+        let spans = [number % a, number / a % b, number / (a * b)];
+        let points = piece.cell.control_points().iter();
+        let ends = ends(&mut points.map(|h| h.weight));
+        (CellIndex { number, spans }, ends)
+    });
+    let ratio = |[low, high]: [f64; 2]| high / low;
+    each.max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))
 }
 
 /// The NURBS of a patch.
 fn volume_of(patch: &PatchModel) -> Result<NurbsVolume, NurbsError> {
     let [u, v, w] = [0, 1, 2].map(|k| KnotVector::new(patch.degrees[k], patch.knots[k].clone()));
     NurbsVolume::new([u?, v?, w?], patch.points.clone(), patch.weights.clone())
+}
+
+/// Pieces that meet end to end: a gap, which is at most 1e-9 of the profile's size, is closed by a
+/// segment.
+///
+/// A segment too low to have faces of its own, or one that runs back, is left out: there the next piece
+/// begins at the height at which the last one ends.
+fn without_gaps(pieces: Vec<Piece>) -> Vec<Piece> {
+    /// Share of the size below which two faces are nearly one.
+    const THIN: f64 = 1e-11;
+    let ends = || pieces.iter().flat_map(Piece::ends);
+    let size = (0..2).fold(0.0_f64, |m, k| {
+        let low = ends().fold(f64::INFINITY, |m, p| m.min(p[k]));
+        let high = ends().fold(f64::NEG_INFINITY, |m, p| m.max(p[k]));
+        m.max(high - low)
+    });
+    let direction = match (pieces.first(), pieces.last()) {
+        (Some(first), Some(last)) => last.ends()[1][1] - first.ends()[0][1],
+        _ => 0.0,
+    };
+    let mut closed: Vec<Piece> = Vec::with_capacity(pieces.len());
+    for mut piece in pieces {
+        for end in [0, piece.points.len() - 1] {
+            // Below the axis by a rounding counts as on it.
+            let r = &mut piece.points[end][0];
+            *r = if *r < Dd::ZERO { Dd::ZERO } else { *r };
+        }
+        if let Some(last) = closed.last() {
+            let at = |[r, z, w]: HomogeneousPoint| [r / w, z / w];
+            let (from, to) = (at(last.points[last.points.len() - 1]), at(piece.points[0]));
+            let [across, along] = [0, 1].map(|k| (to[k] - from[k]).f64());
+            if along.abs() > THIN * size && along * direction > 0.0 {
+                closed.push(Piece {
+                    // Of no curve.
+                    curve: usize::MAX,
+                    points: [from, to].map(|[r, z]| [r, z, Dd::ONE]).to_vec(),
+                });
+            } else {
+                let [r, z, w] = &mut piece.points[0];
+                *z = from[1] * *w;
+                if across.abs() <= THIN * size {
+                    *r = from[0] * *w;
+                }
+            }
+        }
+        closed.push(piece);
+    }
+    closed
 }
 
 /// Cuts a piece where z turns.

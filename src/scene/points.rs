@@ -53,12 +53,33 @@ impl PointFiles {
     }
 
     /// Reads the text of `file` and adds it to `sources`, where it gets a number.
-    pub(super) fn text(
+    fn text(
         &mut self,
         file: &str,
         place: Place,
         sources: &mut Sources,
     ) -> Result<(u32, String), Fault> {
+        let bytes = self.bytes(file, place)?;
+        let shown = self.base_dir.join(file).display().to_string();
+        let text = match String::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(error) => {
+                let at = error.utf8_error().valid_up_to();
+                let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+                let source = sources.add(shown, text.into(), false);
+                return Err(Fault::found(
+                    Place::new(source, at..at),
+                    "bytes that are not utf-8",
+                    "utf-8 text",
+                ));
+            }
+        };
+        let source = sources.add(shown, text.as_str().into(), false);
+        Ok((source, text))
+    }
+
+    /// Reads `file`, which the scene names at `place`.
+    pub(super) fn bytes(&mut self, file: &str, place: Place) -> Result<Vec<u8>, Fault> {
         let path = self.base_dir.join(file);
         let shown = path.display().to_string();
         let unreadable = |error| Fault::read(place, shown.clone(), error);
@@ -82,21 +103,7 @@ impl PointFiles {
             ));
         }
         self.bytes_left -= bytes.len();
-        let text = match String::from_utf8(bytes) {
-            Ok(text) => text,
-            Err(error) => {
-                let at = error.utf8_error().valid_up_to();
-                let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-                let source = sources.add(shown, text.into(), false);
-                return Err(Fault::found(
-                    Place::new(source, at..at),
-                    "bytes that are not utf-8",
-                    "utf-8 text",
-                ));
-            }
-        };
-        let source = sources.add(shown, text.as_str().into(), false);
-        Ok((source, text))
+        Ok(bytes)
     }
 }
 

@@ -15,6 +15,7 @@ use super::solid::{profile, turn};
 use super::value::{Kind, Value};
 use crate::exchange::{self, Spline};
 use crate::nurbs::NurbsVolume;
+use std::path::Path;
 
 /// What a scene has read so far, which solids refer to.
 pub(super) struct Context<'a> {
@@ -283,13 +284,10 @@ fn file(value: &Value, context: &mut Context) -> Result<VolumeModel, Fault> {
     if name.is_empty() || name.contains('\0') {
         return Err(Fault::value(value.place, wanted));
     }
-    let (_, text) = context.files.text(name, value.place, context.sources)?;
+    let bytes = context.files.bytes(name, value.place)?;
     let refused = |reason: String| Fault::found(value.place, format!("{name}: {reason}"), wanted);
-    let format = exchange::Format::of_text(&text).or_else(|| exchange::Format::of_name(name));
-    let Some(format) = format else {
-        return Err(refused("an unknown format".to_owned()));
-    };
-    let reading = exchange::read_text(format, &text).map_err(|e| refused(e.to_string()))?;
+    let reading =
+        exchange::read_bytes(Path::new(name), &bytes).map_err(|e| refused(e.to_string()))?;
     let mut patches = Vec::new();
     for (index, spline) in reading.splines.iter().enumerate() {
         let Spline::Volume(volume) = spline else {

@@ -199,19 +199,27 @@ impl Patches {
         &self.nets.volumes
     }
 
-    /// Two volumes that both hold the middle of a cell of the later one, and where, in local
-    /// coordinates; `None` where no middle is held twice.
+    /// Two volumes that both hold the middle of a cell of the later one, or one twice where it holds the
+    /// middle of a cell of its own again, and where, in local coordinates; `None` where no middle is
+    /// held twice.
     #[must_use]
     pub fn overlap(&self) -> Option<([usize; 2], DVec3)> {
-        for (later, volume) in self.nets.volumes.iter().enumerate().skip(1) {
+        for (later, volume) in self.nets.volumes.iter().enumerate() {
             for piece in volume.to_bezier().unwrap_or_default() {
-                let Ok(middle) = volume.evaluate(piece.parameters([0.5; 3])) else {
+                let at = piece.parameters([0.5; 3]);
+                let Ok(middle) = volume.evaluate(at) else {
                     continue;
                 };
                 let middle = DVec3::from_array(middle);
-                // Of several the lowest answers.
-                if let Some(found) = self.nets.cells.invert(middle)
-                    && found.volume < later
+                // Of several the lowest answers. What is its own is so to far less than this.
+                let apart = |found: &Preimage| {
+                    let share = |k: usize| {
+                        (found.parameters[k] - at[k]).abs() / (piece.end[k] - piece.start[k])
+                    };
+                    (0..3).any(|k| share(k) > 0.25)
+                };
+                if let Some(found) = self.nets.cells.invert_in_space(middle)
+                    && (found.volume < later || found.volume == later && apart(&found))
                 {
                     return Some(([found.volume, later], middle));
                 }
@@ -232,7 +240,19 @@ impl Patches {
     /// Where a point comes from; `None` outside.
     #[must_use]
     pub fn invert(&self, point: DVec3) -> Option<Preimage> {
-        self.nets.cells.invert(self.frame.to_local(point).point)
+        let local = self.frame.to_local(point).point;
+        self.nets.cells.invert(local).or_else(|| {
+            // The point of the net's coordinates is rounded; on a face it may be outside of the net.
+            if self.side(point) == Side::Outside {
+                return None;
+            }
+            let nearest = self.nets.faces.nearest(local)?;
+            let face = self.nets.faces.faces().get(nearest.face)?;
+            Some(Preimage {
+                volume: face.patch,
+                parameters: face.volume_parameters(nearest.parameters),
+            })
+        })
     }
 
     /// The scalar at a point of the solid; 0 for a field that it does not have.
@@ -258,7 +278,25 @@ impl Patches {
         }
         let local = self.frame.to_local(point);
         let exact = || self.frame.to_local_exact(point);
-        self.nets.cells.side(local.point, local.error, exact)
+        let side = self.nets.cells.side(local.point, local.error, exact);
+        // Where cells of different sizes meet, a face of one is on those of several: cells know of
+        // pairs only, the outer faces of all.
+        if side == Side::On && self.is_beneath(point, local.point) {
+            Side::Inside
+        } else {
+            side
+        }
+    }
+
+    /// Whether a point of the solid is further from the faces that bound it than rounding.
+    #[cold]
+    fn is_beneath(&self, point: DVec3, local: DVec3) -> bool {
+        let size = self.bounds.longest_side() + point.abs().max_element();
+        let scale = self.frame.scale();
+        // Distances are told apart to 64 eps.
+        let rounding = 256.0 * f64::EPSILON * size / scale;
+        let limit = (self.margin / scale).max(2.0 * rounding);
+        self.nets.faces.distance(local, limit) > rounding
     }
 
     pub(super) fn distance(&self, point: DVec3, inside: bool, limit: f64) -> f64 {
@@ -377,7 +415,6 @@ impl Patches {
         moved
     }
 
-    /// The outer faces: lines of constant first parameter.
     /// Whether the surface may come within `margin` (scene units) of a stretch of a path, given in local coordinates.
     pub(super) fn may_meet(&self, stretch: &Stretch, margin: f64) -> bool {
         let Aabb { min, max } = stretch.bounds();
@@ -385,6 +422,7 @@ impl Patches {
         self.nets.faces.may_touch(min - margin, max + margin)
     }
 
+    /// The outer faces: lines of constant first parameter.
     pub(super) fn patches(&self, _seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
         let faces = 0..self.nets.faces.faces().len();
         let cuts = || (0..=8).map(|k| f64::from(k) / 8.0).collect();
