@@ -5,6 +5,7 @@ use super::fraction::FractionSampler;
 use super::memory::copy_past_caches;
 use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
 use super::tally::{Certainty, Tally};
+use super::tilted::{TiltedSampler, TiltedScratch};
 use super::upright::{UprightBody, UprightScratch};
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Side};
@@ -93,6 +94,8 @@ pub struct LayerSampler<'a> {
     upright: Option<UprightBody>,
     /// The distances of such a body.
     radial: Option<RadialSampler>,
+    /// Both of the one body that is turned about another axis.
+    tilted: Option<TiltedSampler>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -112,6 +115,7 @@ pub(super) struct LayerScratch {
     bytes: Vec<u8>,
     upright: UprightScratch,
     radial: RadialScratch,
+    tilted: TiltedScratch,
 }
 
 /// What is left to the rows.
@@ -161,6 +165,7 @@ impl<'a> LayerSampler<'a> {
         let body = assembly.single().and_then(Body::revolved);
         let upright = body.and_then(|b| UprightBody::new(b, grid));
         let radial = body.filter(|_| selection.sdf && upright.is_some());
+        let tilted = body.filter(|b| !b.rows().is_upright());
         Self {
             cancel: None,
             assembly,
@@ -173,6 +178,7 @@ impl<'a> LayerSampler<'a> {
             kernel: Kernel::default(),
             upright,
             radial: radial.and_then(|b| RadialSampler::new(b, grid)),
+            tilted: tilted.and_then(|b| TiltedSampler::new(b, grid)),
         }
     }
 
@@ -187,6 +193,7 @@ impl<'a> LayerSampler<'a> {
     pub fn with_exact_distances(self) -> Self {
         Self {
             radial: None,
+            tilted: None,
             ..self
         }
     }
@@ -319,19 +326,29 @@ impl<'a> LayerSampler<'a> {
         Some((self.assembly.single()?.revolved()?, self.upright.as_ref()?))
     }
 
+    /// The one body that is turned about an axis of its own.
+    fn tilted_body(&self) -> Option<(&Revolved, &TiltedSampler)> {
+        Some((self.assembly.single()?.revolved()?, self.tilted.as_ref()?))
+    }
+
     /// The bits of layer `k`, where they are found in whole layers.
     fn layer_bits(&self, k: usize, scratch: &mut LayerScratch) -> bool {
-        let Some((body, upright)) = self.upright_body() else {
+        if !self.fills_occupancy() {
             return false;
-        };
+        }
         let LayerScratch {
             inside,
             upright: own,
+            tilted: turned,
             ..
         } = scratch;
         inside.clear();
         inside.resize(bits::words_for(self.grid.layer_len()), 0);
-        upright.layer(self.kernel, body, self.grid, k, own, inside);
+        if let Some((body, upright)) = self.upright_body() {
+            upright.layer(self.kernel, body, self.grid, k, own, inside);
+        } else if let Some((body, tilted)) = self.tilted_body() {
+            tilted.bits(self.kernel, body, self.grid, k, turned, inside);
+        }
         true
     }
 
@@ -343,9 +360,6 @@ impl<'a> LayerSampler<'a> {
         out: &mut [f32],
         past_caches: bool,
     ) -> bool {
-        let (Some((body, _)), Some(radial)) = (self.upright_body(), &self.radial) else {
-            return false;
-        };
         let writing = Writing {
             kernel: self.kernel,
             band: self.selection.band.unwrap_or(f64::INFINITY),
@@ -354,9 +368,17 @@ impl<'a> LayerSampler<'a> {
         let LayerScratch {
             inside,
             radial: own,
+            tilted: turned,
             ..
         } = scratch;
-        radial.layer(body, self.grid, KnownLayer { k, inside }, writing, own, out);
+        let known = KnownLayer { k, inside };
+        if let (Some((body, _)), Some(radial)) = (self.upright_body(), &self.radial) {
+            radial.layer(body, self.grid, known, writing, own, out);
+        } else if let Some((body, tilted)) = self.tilted_body() {
+            tilted.layer(body, self.grid, known, writing, turned, out);
+        } else {
+            return false;
+        }
         true
     }
 
@@ -393,12 +415,12 @@ impl<'a> LayerSampler<'a> {
 
     /// Whether [`occupancy_into`](Self::occupancy_into) serves.
     pub(super) fn fills_occupancy(&self) -> bool {
-        self.upright.is_some()
+        self.upright.is_some() || self.tilted.is_some()
     }
 
     /// Whether [`distance_into`](Self::distance_into) serves.
     pub(super) fn fills_distance(&self) -> bool {
-        self.radial.is_some()
+        self.radial.is_some() || self.tilted.is_some()
     }
 
     /// Fills one layer of occupancy in a large buffer.

@@ -1,0 +1,363 @@
+//! Distances of voxels from a table of cells, by lanes.
+//!
+//! Voxel centres, rows of them or any points of a layer, become places of the half-plane; each place finds its cell by
+//! two look-ups; the cell's circle gives the distance ([`CellTable`]).
+//!
+//! ```text
+//!   r = sqrt(x² + y²), z  ──> fixed point ──> tile ──> cell ──> q from its centre ──> distance
+//! ```
+//!
+//! The axis frame is turned so that y stays the same along a row. Places are rounded once, from f64, by half a place at
+//! most; what follows of them is exact but for the sum of some numbers of a cell's size.
+//!
+//! The plain loops are the definition; compiled for wider lanes they do the same operations in the same order.
+
+use crate::math::Kernel;
+use crate::region::{CellTable, LEVEL_BITS, LOST_BITS, TILE};
+#[cfg(target_arch = "x86_64")]
+use pulp::Arch;
+
+/// Voxels that go through each step together: their numbers stay in the nearest cache.
+pub(super) const CHUNK: usize = 256;
+/// Voxels of a block; chunks are filled up to whole ones.
+pub(super) const LANES: usize = 16;
+/// Added to a number below 2^31, leaves its nearest integer in the lowest bits of the sum.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// A layer of voxels as places see it: linear in i and j.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LayerView {
+    /// Across the axis, along the rows.
+    pub(super) x: [f64; 3],
+    /// Across both.
+    pub(super) y: [f64; 2],
+    /// Along the axis, from the lattice's corner.
+    pub(super) z: [f64; 3],
+    /// Radius of the lattice's corner.
+    pub(super) base: f64,
+}
+
+/// The points whose distances are wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Points<'a> {
+    /// The voxels of a row, from the first on.
+    Row(f64),
+    /// Points of the layer: i and j, whole or not.
+    Any(&'a [f64], &'a [f64]),
+}
+
+/// What one thread reuses.
+#[derive(Debug)]
+pub(super) struct Lanes {
+    r: [u32; CHUNK],
+    z: [u32; CHUNK],
+    tile: [u32; CHUNK],
+    cell: [u32; CHUNK],
+    /// From the cell's centre, in steps.
+    away: [[f32; CHUNK]; 2],
+}
+
+impl Default for Lanes {
+    fn default() -> Self {
+        Self {
+            r: [0; CHUNK],
+            z: [0; CHUNK],
+            tile: [0; CHUNK],
+            cell: [0; CHUNK],
+            away: [[0.0; CHUNK]; 2],
+        }
+    }
+}
+
+/// Fills `out` with the signed distances of points of a layer, NaN where the table has none, and sets in `doubts` a bit
+/// for each that is NaN or nearer to 0 than `least`. Both have room for whole blocks, which may be filled.
+pub(super) fn look_up(
+    kernel: Kernel,
+    table: &CellTable,
+    view: LayerView,
+    points: Points<'_>,
+    least: f32,
+    lanes: &mut Lanes,
+    (out, doubts): (&mut [f32], &mut [u16]),
+) {
+    let job = LookUp {
+        table,
+        view,
+        points,
+        least,
+        lanes,
+        out,
+        doubts,
+    };
+    match kernel.lanes() {
+        None => job.run(&Plain),
+        #[cfg(target_arch = "x86_64")]
+        Some(Arch::V4(simd)) => simd.vectorize(Wide512(simd, job)),
+        Some(arch) => arch.dispatch(Wide(job)),
+    }
+}
+
+struct LookUp<'a> {
+    table: &'a CellTable,
+    view: LayerView,
+    points: Points<'a>,
+    least: f32,
+    lanes: &'a mut Lanes,
+    out: &'a mut [f32],
+    doubts: &'a mut [u16],
+}
+
+/// The compiler's own lanes.
+struct Wide<'a>(LookUp<'a>);
+
+impl pulp::NullaryFnOnce for Wide<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.run(&Plain);
+    }
+}
+
+/// The cells of a block: four numbers of each.
+type Four = [[u32; LANES]; 4];
+
+/// How the cells of a block are put into lanes.
+trait Collect {
+    fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four;
+}
+
+/// One by one.
+struct Plain;
+
+#[inline(always)]
+fn cell(cells: &[[u32; 4]], number: u32) -> [u32; 4] {
+    // The first cell is that of places that have none.
+    match cells.get(number as usize) {
+        Some(cell) => *cell,
+        None => cells[0],
+    }
+}
+
+impl Collect for Plain {
+    #[inline(always)]
+    fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four {
+        let mut four = [[0; LANES]; 4];
+        for n in 0..LANES {
+            let [a, b, c, d] = cell(cells, numbers[n]);
+            four[0][n] = a;
+            four[1][n] = b;
+            four[2][n] = c;
+            four[3][n] = d;
+        }
+        four
+    }
+}
+
+impl LookUp<'_> {
+    #[inline(always)]
+    fn run(self, collect: &impl Collect) {
+        let Self {
+            table,
+            view,
+            points,
+            least,
+            lanes,
+            out,
+            doubts,
+        } = self;
+        let bits = table.bits();
+        let (tiles, across) = table.tiles();
+        let cells = table.cells();
+        let size = 1.0 / (1_u32 << bits) as f32;
+        let factors = factors(table);
+        let outs = out.chunks_mut(CHUNK).zip(doubts.chunks_mut(CHUNK / LANES));
+        for (chunk, (out, doubts)) in outs.enumerate() {
+            let count = out.len();
+            match points {
+                Points::Row(j) => row_places(&view, j, chunk * CHUNK, count, lanes),
+                Points::Any(i, j) => {
+                    let range = chunk * CHUNK..chunk * CHUNK + count;
+                    any_places(&view, &i[range.clone()], &j[range], lanes);
+                }
+            }
+            tile_numbers(bits, across, count, lanes);
+            for tile in &mut lanes.tile[..count] {
+                *tile = match tiles.get(*tile as usize) {
+                    Some(tile) => *tile,
+                    None => 0,
+                };
+            }
+            cell_numbers(bits, size, count, lanes);
+            let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(doubts);
+            let numbers = lanes.cell.as_chunks::<LANES>().0.iter();
+            let [ar, az] = &lanes.away;
+            let away = ar.as_chunks::<LANES>().0.iter().zip(az.as_chunks::<LANES>().0);
+            for (((out, doubts), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
+                let four = collect.collect(cells, numbers);
+                *out = distances(&four, [ar, az], &factors);
+                let mut mask = 0;
+                for n in 0..LANES {
+                    mask |= u16::from(!(out[n].abs() >= least)) << n;
+                }
+                *doubts = mask;
+            }
+        }
+    }
+}
+
+/// The series' coefficients in scene units, and what the bits of a lost part stand for.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "a length, rounded once")]
+fn factors(table: &CellTable) -> [f32; 6] {
+    let step = table.step() as f32;
+    [
+        step,
+        -step,
+        2.0 * step,
+        -5.0 * step,
+        14.0 * step,
+        table.lost(),
+    ]
+}
+
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, reason = "the lowest bits are wanted")]
+fn place(v: f64) -> u32 {
+    (v + ROUND).to_bits() as u32
+}
+
+/// Places of voxels of row `j`.
+#[inline(always)]
+#[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+fn row_places(view: &LayerView, j: f64, first: usize, count: usize, lanes: &mut Lanes) {
+    let LayerView { x, y, z, base } = *view;
+    let start = first as f64;
+    let (x0, z0, y0) = (x[0] + j * x[2], z[0] + j * z[2], y[0] + j * y[1]);
+    let y2 = y0 * y0;
+    let (to_r, to_z) = (&mut lanes.r[..count], &mut lanes.z[..count]);
+    for n in 0..count {
+        let i = start + f64::from(n as u32);
+        let x = x0 + i * x[1];
+        to_r[n] = place((x * x + y2).sqrt() - base);
+        to_z[n] = place(z0 + i * z[1]);
+    }
+}
+
+/// Places of any points.
+#[inline(always)]
+fn any_places(view: &LayerView, i: &[f64], j: &[f64], lanes: &mut Lanes) {
+    let LayerView { x, y, z, base } = *view;
+    let count = i.len();
+    let (to_r, to_z, j) = (&mut lanes.r[..count], &mut lanes.z[..count], &j[..count]);
+    for n in 0..count {
+        let x = (x[0] + j[n] * x[2]) + i[n] * x[1];
+        let y = y[0] + j[n] * y[1];
+        to_r[n] = place((x * x + y * y).sqrt() - base);
+        to_z[n] = place((z[0] + j[n] * z[2]) + i[n] * z[1]);
+    }
+}
+
+#[inline(always)]
+fn tile_numbers(bits: u32, across: u32, count: usize, lanes: &mut Lanes) {
+    let (r, z, tile) = (
+        &lanes.r[..count],
+        &lanes.z[..count],
+        &mut lanes.tile[..count],
+    );
+    let shift = bits + TILE;
+    for n in 0..count {
+        let row = z[n].wrapping_shr(shift).wrapping_mul(across);
+        tile[n] = row.wrapping_add(r[n].wrapping_shr(shift));
+    }
+}
+
+#[inline(always)]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "at most 22 bits and the sign"
+)]
+fn cell_numbers(bits: u32, size: f32, count: usize, lanes: &mut Lanes) {
+    let (r, z, tile) = (&lanes.r[..count], &lanes.z[..count], &lanes.tile[..count]);
+    let [ar, az] = &mut lanes.away;
+    let (cell, ar, az) = (&mut lanes.cell[..count], &mut ar[..count], &mut az[..count]);
+    let side = bits + TILE;
+    let in_tile = (1_u32 << side) - 1;
+    for n in 0..count {
+        let level = tile[n] & ((1 << LEVEL_BITS) - 1);
+        let shift = side - level;
+        let (r, z) = (r[n] & in_tile, z[n] & in_tile);
+        let row = z.wrapping_shr(shift).wrapping_shl(level);
+        cell[n] = (tile[n] >> LEVEL_BITS)
+            .wrapping_add(row)
+            .wrapping_add(r.wrapping_shr(shift));
+        let in_cell = 1_u32.wrapping_shl(shift).wrapping_sub(1);
+        let half = (in_cell >> 1).wrapping_add(1);
+        let away = |c: u32| (c & in_cell).wrapping_sub(half).cast_signed() as f32 * size;
+        ar[n] = away(r);
+        az[n] = away(z);
+    }
+}
+
+/// The distances of a block.
+#[inline(always)]
+#[allow(clippy::cast_precision_loss, reason = "ten bits and the sign")]
+fn distances(four: &Four, away: [&[f32; LANES]; 2], factors: &[f32; 6]) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
+    let [f0, f1, f2, f3, f4, lost] = *factors;
+    for n in 0..LANES {
+        let [d, gr, gz, kept] = [four[0][n], four[1][n], four[2][n], four[3][n]];
+        let bend = f32::from_bits(kept & !((1 << LOST_BITS) - 1));
+        let rest = (kept << (32 - LOST_BITS)).cast_signed() as f32 * lost;
+        let (r, z) = (away[0][n], away[1][n]);
+        let linear = f32::from_bits(gr) * r + f32::from_bits(gz) * z;
+        let e = linear + bend * (r * r + z * z);
+        let v = bend * e;
+        let series = f0 + v * (f1 + v * (f2 + v * (f3 + v * f4)));
+        out[n] = f32::from_bits(d) + (rest + e * series);
+    }
+    out
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Wide512<'a>(pulp::x86::V4, LookUp<'a>);
+
+#[cfg(target_arch = "x86_64")]
+impl pulp::NullaryFnOnce for Wide512<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.1.run(&Transpose(self.0));
+    }
+}
+
+/// Cells in quarters of wide registers, transposed.
+#[cfg(target_arch = "x86_64")]
+struct Transpose(pulp::x86::V4);
+
+#[cfg(target_arch = "x86_64")]
+impl Collect for Transpose {
+    #[inline(always)]
+    fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four {
+        let f = self.0.avx512f;
+        let mut lines = [f._mm512_setzero_si512(); 4];
+        for n in 0..4 {
+            lines[n] = pulp::cast([
+                cell(cells, numbers[n]),
+                cell(cells, numbers[n + 4]),
+                cell(cells, numbers[n + 8]),
+                cell(cells, numbers[n + 12]),
+            ]);
+        }
+        let [a, b, c, d] = lines;
+        let (p, q) = (f._mm512_unpacklo_epi32(a, b), f._mm512_unpackhi_epi32(a, b));
+        let (s, t) = (f._mm512_unpacklo_epi32(c, d), f._mm512_unpackhi_epi32(c, d));
+        [
+            pulp::cast(f._mm512_unpacklo_epi64(p, s)),
+            pulp::cast(f._mm512_unpackhi_epi64(p, s)),
+            pulp::cast(f._mm512_unpacklo_epi64(q, t)),
+            pulp::cast(f._mm512_unpackhi_epi64(q, t)),
+        ]
+    }
+}
