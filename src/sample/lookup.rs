@@ -122,29 +122,24 @@ impl pulp::NullaryFnOnce for Wide<'_> {
 /// The cells of a block: four numbers of each.
 type Four = [[u32; LANES]; 4];
 
-/// How the cells of a block are put into lanes.
-trait Collect {
+/// What the compiler does not find lanes for by itself.
+trait Block {
+    /// The cells of a block.
     fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four;
+
+    /// A bit for each value that is NaN or nearer to 0 than `least`.
+    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16;
 }
 
 /// One by one.
 struct Plain;
 
-#[inline(always)]
-fn cell(cells: &[[u32; 4]], number: u32) -> [u32; 4] {
-    // The first cell is that of places that have none.
-    match cells.get(number as usize) {
-        Some(cell) => *cell,
-        None => cells[0],
-    }
-}
-
-impl Collect for Plain {
+impl Block for Plain {
     #[inline(always)]
     fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four {
         let mut four = [[0; LANES]; 4];
         for n in 0..LANES {
-            let [a, b, c, d] = cell(cells, numbers[n]);
+            let [a, b, c, d] = cells[numbers[n] as usize];
             four[0][n] = a;
             four[1][n] = b;
             four[2][n] = c;
@@ -152,11 +147,20 @@ impl Collect for Plain {
         }
         four
     }
+
+    #[inline(always)]
+    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16 {
+        let mut mask = 0;
+        for n in 0..LANES {
+            mask |= u16::from(!(values[n].abs() >= least)) << n;
+        }
+        mask
+    }
 }
 
 impl LookUp<'_> {
     #[inline(always)]
-    fn run(self, collect: &impl Collect) {
+    fn run(self, block: &impl Block) {
         let Self {
             table,
             view,
@@ -168,6 +172,7 @@ impl LookUp<'_> {
         } = self;
         let bits = table.bits();
         let (tiles, across) = table.tiles();
+        let last = tiles.len() as u32 - 1;
         let cells = table.cells();
         let size = 1.0 / (1_u32 << bits) as f32;
         let factors = factors(table);
@@ -181,12 +186,9 @@ impl LookUp<'_> {
                     any_places(&view, &i[range.clone()], &j[range], lanes);
                 }
             }
-            tile_numbers(bits, across, count, lanes);
+            tile_numbers(bits, across, last, count, lanes);
             for tile in &mut lanes.tile[..count] {
-                *tile = match tiles.get(*tile as usize) {
-                    Some(tile) => *tile,
-                    None => 0,
-                };
+                *tile = tiles[*tile as usize];
             }
             cell_numbers(bits, size, count, lanes);
             let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(doubts);
@@ -194,13 +196,10 @@ impl LookUp<'_> {
             let [ar, az] = &lanes.away;
             let away = ar.as_chunks::<LANES>().0.iter().zip(az.as_chunks::<LANES>().0);
             for (((out, doubts), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
-                let four = collect.collect(cells, numbers);
-                *out = distances(&four, [ar, az], &factors);
-                let mut mask = 0;
-                for n in 0..LANES {
-                    mask |= u16::from(!(out[n].abs() >= least)) << n;
-                }
-                *doubts = mask;
+                let four = block.collect(cells, numbers);
+                let values = distances(&four, [ar, az], &factors);
+                *doubts = block.doubts(&values, least);
+                *out = values;
             }
         }
     }
@@ -258,8 +257,9 @@ fn any_places(view: &LayerView, i: &[f64], j: &[f64], lanes: &mut Lanes) {
     }
 }
 
+/// Tiles of places. What fills up the last block may be anywhere: it takes any tile.
 #[inline(always)]
-fn tile_numbers(bits: u32, across: u32, count: usize, lanes: &mut Lanes) {
+fn tile_numbers(bits: u32, across: u32, last: u32, count: usize, lanes: &mut Lanes) {
     let (r, z, tile) = (
         &lanes.r[..count],
         &lanes.z[..count],
@@ -268,7 +268,7 @@ fn tile_numbers(bits: u32, across: u32, count: usize, lanes: &mut Lanes) {
     let shift = bits + TILE;
     for n in 0..count {
         let row = z[n].wrapping_shr(shift).wrapping_mul(across);
-        tile[n] = row.wrapping_add(r[n].wrapping_shr(shift));
+        tile[n] = row.wrapping_add(r[n].wrapping_shr(shift)).min(last);
     }
 }
 
@@ -337,17 +337,17 @@ impl pulp::NullaryFnOnce for Wide512<'_> {
 struct Transpose(pulp::x86::V4);
 
 #[cfg(target_arch = "x86_64")]
-impl Collect for Transpose {
+impl Block for Transpose {
     #[inline(always)]
     fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four {
         let f = self.0.avx512f;
         let mut lines = [f._mm512_setzero_si512(); 4];
         for n in 0..4 {
             lines[n] = pulp::cast([
-                cell(cells, numbers[n]),
-                cell(cells, numbers[n + 4]),
-                cell(cells, numbers[n + 8]),
-                cell(cells, numbers[n + 12]),
+                cells[numbers[n] as usize],
+                cells[numbers[n + 4] as usize],
+                cells[numbers[n + 8] as usize],
+                cells[numbers[n + 12] as usize],
             ]);
         }
         let [a, b, c, d] = lines;
@@ -359,5 +359,12 @@ impl Collect for Transpose {
             pulp::cast(f._mm512_unpacklo_epi64(q, t)),
             pulp::cast(f._mm512_unpackhi_epi64(q, t)),
         ]
+    }
+
+    #[inline(always)]
+    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16 {
+        let f = self.0.avx512f;
+        let size = f._mm512_abs_ps(pulp::cast(*values));
+        f._mm512_cmp_ps_mask::<9>(size, f._mm512_set1_ps(least))
     }
 }
