@@ -19,10 +19,13 @@
 //! ```
 //!
 //! with g the gradients of the unsigned distances, or more than 2 w, whatever the gradients. Tiles are divided until
-//! each cell is within the tolerance; cells that are not, at the finest level, have NaN as their distance.
+//! each cell is within the tolerance. Where a ridge crosses a cell of the finest level the circles of all runs that may
+//! be nearest are kept apart from the cells, and the nearest of them is the distance. Cells without a circle, those
+//! too, have NaN as their distance.
 //!
 //! Points are in places: fixed-point numbers of *steps*, from the lattice's corner on.
 
+use super::chain::Local;
 use super::field::{Leaf, MOST_RUNS, MeridianField};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -35,6 +38,8 @@ pub(crate) struct CellTable {
     /// Tiles along r.
     across: u32,
     cells: Vec<Cell>,
+    /// Circles of cells that a ridge crosses.
+    ridges: Vec<Cell>,
     /// Bits of a place after the point.
     bits: u32,
     /// Corner of the first tile, in the region's unit.
@@ -45,7 +50,8 @@ pub(crate) struct CellTable {
 }
 
 /// One cell's numbers: the distance, less than half an f32 ulp off; both parts of the gradient, in steps; and half the
-/// bend times a step, with what the distance lost in its lowest [`LOST_BITS`].
+/// bend times a step, with what the distance lost in its lowest [`LOST_BITS`]. Where the distance is NaN, the next two
+/// are the first of its circles among the ridges', and how many it has.
 pub(crate) type Cell = [u32; 4];
 
 /// Steps along a tile's side are 2 to the power of this.
@@ -67,7 +73,9 @@ const BENT: f64 = 0.2;
 /// Rounding of a bend that is stored, as a share of it.
 const BEND_ROUNDING: f64 = 1.0 / 16_384.0;
 /// The cell of those who have none.
-const NONE: Cell = [0x7fc0_0000, 0, 0, 0];
+const NONE: Cell = [NAN, 0, 0, 0];
+/// The distance of cells without a circle.
+const NAN: u32 = 0x7fc0_0000;
 
 impl CellTable {
     /// The cells of a field whose unit is `scale` scene units, each within `tolerance` region units of the distance;
@@ -100,10 +108,16 @@ impl CellTable {
         }
         let mut cells = Vec::with_capacity(count);
         let mut tiles = Vec::with_capacity(across as usize * up as usize);
+        let mut ridges = Vec::new();
         cells.push(NONE);
         for row in rows {
             let first = u32::try_from(cells.len()).ok()?;
-            cells.extend_from_slice(&row.cells);
+            let first_ridge = u32::try_from(ridges.len()).ok()?;
+            ridges.extend_from_slice(&row.ridges);
+            cells.extend(row.cells.iter().map(|cell| match *cell {
+                [NAN, first, count, rest] => [NAN, first_ridge + first, count, rest],
+                cell => cell,
+            }));
             tiles.extend(row.tiles.iter().map(|tile| match tile {
                 Some([at, level]) => ((first + at) << LEVEL_BITS) | level,
                 None => 0,
@@ -118,6 +132,7 @@ impl CellTable {
             tiles,
             across,
             cells,
+            ridges,
             bits,
             corner,
             step: [step, step * scale],
@@ -133,6 +148,14 @@ impl CellTable {
     /// All cells.
     pub(crate) fn cells(&self) -> &[Cell] {
         &self.cells
+    }
+
+    /// The circles of a cell that a ridge crosses, none for those without a circle.
+    pub(crate) fn ridge(&self, cell: &Cell) -> &[Cell] {
+        match *cell {
+            [NAN, first, count, _] => &self.ridges[first as usize..(first + count) as usize],
+            _ => &[],
+        }
     }
 
     /// Bits of a place after the point.
@@ -169,9 +192,12 @@ struct Tiles<'a> {
     /// First cell and level of each tile that has cells.
     tiles: Vec<Option<[u32; 2]>>,
     cells: Vec<Cell>,
+    ridges: Vec<Cell>,
     /// The features nearest to the last cell's centre, one of each run of its leaf.
     near: Near,
 }
+
+type Feet = smallvec::SmallVec<[(u32, Local); MOST_RUNS]>;
 
 #[derive(Debug, Default)]
 struct Near {
@@ -195,15 +221,17 @@ impl<'a> Tiles<'a> {
             tolerance,
             tiles: Vec::new(),
             cells: Vec::new(),
+            ridges: Vec::new(),
             near: Near::default(),
         }
     }
 
     /// Adds a tile, divided as far as it needs to be.
     fn add(&mut self, tile: [u32; 2]) {
-        let first = self.cells.len();
+        let (first, first_ridge) = (self.cells.len(), self.ridges.len());
         for level in 0..=FINEST {
             self.cells.truncate(first);
+            self.ridges.truncate(first_ridge);
             if let Some(circles) = self.divided(tile, level) {
                 let at = u32::try_from(first).unwrap_or(u32::MAX);
                 self.tiles.push((circles > 0).then_some([at, level]));
@@ -246,7 +274,7 @@ impl<'a> Tiles<'a> {
                     low: [low(0, r), low(1, z)],
                     side,
                 };
-                let cell = match self.circle(leaf, square) {
+                let cell = match self.circle(leaf, square, level == FINEST) {
                     Ok(cell) => {
                         circles += 1;
                         cell
@@ -260,8 +288,8 @@ impl<'a> Tiles<'a> {
         Some(circles)
     }
 
-    /// The circle of one cell.
-    fn circle(&mut self, number: u32, square: Square) -> Result<Cell, Refusal> {
+    /// The circle of one cell, or where it is one of the `finest` all that may be nearest in it.
+    fn circle(&mut self, number: u32, square: Square, finest: bool) -> Result<Cell, Refusal> {
         let leaf: &Leaf = self.field.leaf(number);
         if !leaf.smooth {
             return Err(Refusal::Never);
@@ -271,58 +299,76 @@ impl<'a> Tiles<'a> {
             self.near.features = self.field.features(leaf).into();
         }
         let chain = self.field.chain();
-        let (centre, corners) = (square.centre(), square.corners());
-        let w = square.half_diagonal();
+        let centre = square.centre();
         let mut first = 0;
-        let mut feet = [chain.local(self.near.features[0], centre); MOST_RUNS];
+        let mut feet: Feet = smallvec::SmallVec::new();
         for (n, feature) in self.near.features.iter_mut().enumerate() {
             *feature = chain.walk(*feature, centre);
-            feet[n] = chain.local(*feature, centre);
-            if feet[n].value.abs() < feet[first].value.abs() {
+            feet.push((*feature, chain.local(*feature, centre)));
+            if feet[n].1.value.abs() < feet[first].1.value.abs() {
                 first = n;
             }
         }
-        let near = feet[first];
-        let bend = |n: usize| {
-            let b = feet[n].bend.abs();
+        feet.swap(0, first);
+        let cell = self.expanded(feet[0], square).ok_or(Refusal::Divide)?;
+        // Those that may be nearest somewhere in the cell, too.
+        let rivals = || (feet[1..].iter()).filter(|f| !self.is_clear(feet[0], **f, square));
+        if rivals().next().is_none() {
+            return Ok(cell);
+        }
+        if !finest {
+            return Err(Refusal::Divide);
+        }
+        let mut circles: smallvec::SmallVec<[Cell; MOST_RUNS]> = smallvec::smallvec![cell];
+        for foot in rivals() {
+            circles.push(self.expanded(*foot, square).ok_or(Refusal::Never)?);
+        }
+        let counted = |n: usize| u32::try_from(n).unwrap_or(0);
+        let cell = [NAN, counted(self.ridges.len()), counted(circles.len()), 0];
+        self.ridges.extend_from_slice(&circles);
+        Ok(cell)
+    }
+
+    /// Whether one run is nearer than another all over a cell.
+    fn is_clear(&self, near: (u32, Local), other: (u32, Local), square: Square) -> bool {
+        let w = square.half_diagonal();
+        let [(_, a), (_, b)] = [near, other];
+        let gap = b.value.abs() - a.value.abs();
+        if gap > 2.0 * w * (1.0 + 1e-9) {
+            return true;
+        }
+        // Neither changes its sign.
+        if a.value.abs().min(b.value.abs()) <= w * (1.0 + 1e-9) {
+            return false;
+        }
+        let [s, t] = [a, b].map(|l| l.value.signum());
+        let slope = (t * b.gradient[0] - s * a.gradient[0])
+            .hypot(t * b.gradient[1] - s * a.gradient[1]);
+        let bend = |l: Local| {
             // Within the cell, the centre of curvature may be nearer by w.
-            b / (1.0 - (b * w).min(1.0))
+            l.bend.abs() / (1.0 - (l.bend.abs() * w).min(1.0))
         };
-        if near.bend.abs() * w > BENT {
-            return Err(Refusal::Divide);
+        let least = w * (slope + 1e-9) + 0.5 * w * w * (bend(a) + bend(b));
+        let chain = self.field.chain();
+        let departures =
+            || [near, other].map(|(feature, _)| chain.departure(feature, &square.corners()));
+        gap > least && gap > least + departures().iter().sum::<f64>()
+    }
+
+    /// The circle of a run over a cell, where it is within the tolerance.
+    fn expanded(&self, (feature, local): (u32, Local), square: Square) -> Option<Cell> {
+        let w = square.half_diagonal();
+        if local.bend.abs() * w > BENT {
+            return None;
         }
-        let departure = chain.departure(self.near.features[first], &corners);
-        if departure > self.tolerance {
-            return Err(Refusal::Divide);
-        }
-        for n in (0..self.near.features.len()).filter(|n| *n != first) {
-            let other = feet[n];
-            let gap = other.value.abs() - near.value.abs();
-            let clear = if gap > 2.0 * w * (1.0 + 1e-9) {
-                true
-            } else if near.value.abs().min(other.value.abs()) > w * (1.0 + 1e-9) {
-                let [s, t] = [near, other].map(|l| l.value.signum());
-                let slope = (t * other.gradient[0] - s * near.gradient[0])
-                    .hypot(t * other.gradient[1] - s * near.gradient[1]);
-                let bends = 0.5 * w * w * (bend(first) + bend(n));
-                let least = w * (slope + 1e-9) + bends + departure;
-                gap > least && gap > least + chain.departure(self.near.features[n], &corners)
-            } else {
-                false
-            };
-            if !clear {
-                return Err(Refusal::Divide);
-            }
-        }
-        let half_bend = 0.5 * near.bend;
+        let half_bend = 0.5 * local.bend;
         let most = w + half_bend.abs() * w * w;
         let v = half_bend.abs() * most;
         let rest = 42.0 * most * v.powi(5) / (1.0 - 4.0 * v);
         let rounding = BEND_ROUNDING * half_bend.abs() * w * w;
-        if !(departure + rest + rounding <= self.tolerance) {
-            return Err(Refusal::Divide);
-        }
-        Ok(self.stored(near.value, near.gradient, half_bend))
+        let departure = self.field.chain().departure(feature, &square.corners());
+        (departure + rest + rounding <= self.tolerance)
+            .then(|| self.stored(local.value, local.gradient, half_bend))
     }
 
     #[allow(
@@ -392,10 +438,19 @@ mod tests {
                 ((steps[c] - f64::from(tile[c] << TILE)) * per_step) as u32
             });
             let index = (number >> LEVEL_BITS) + (at[1] << level) + at[0];
-            let [d, gr, gz, kept] = self.cells[index as usize];
+            let cell = self.cells[index as usize];
             let q: [f64; 2] = std::array::from_fn(|c| {
                 steps[c] - f64::from(tile[c] << TILE) - (f64::from(at[c]) + 0.5) / per_step
             });
+            let circles = match cell[0] {
+                NAN => self.ridge(&cell),
+                _ => std::slice::from_ref(&cell),
+            };
+            let values = circles.iter().map(|c| self.circle_at(*c, q));
+            values.fold(f64::NAN, |m, v| if m.abs() < v.abs() { m } else { v })
+        }
+
+        fn circle_at(&self, [d, gr, gz, kept]: Cell, q: [f64; 2]) -> f64 {
             let value = |b: u32| f64::from(f32::from_bits(b));
             let half_bend = value(kept & !((1 << LOST_BITS) - 1));
             let lost = f64::from((kept << (32 - LOST_BITS)).cast_signed()) * f64::from(self.lost);
@@ -461,12 +516,18 @@ mod tests {
                     );
                 }
                 eprintln!(
-                    "{name:>9} {voxels:>5}: {features} features, field {built:?}, {} tiles and {} cells {filled:?}, {:.2}% have none, worst {worst:.1e} of a step",
+                    "{name:>9} {voxels:>5}: {features} features, field {built:?}, {} tiles, {} cells and {} ridges {filled:?}, {:.2}% have none, worst {worst:.1e} of a step",
                     table.tiles.len(),
                     table.cells.len(),
+                    table.ridges.len(),
                     100.0 * f64::from(none) / f64::from(points)
                 );
-                assert!(none < points / 10, "{name} {voxels}: {none} of {points} have no cell");
+                // A coarse grid has ridges in most of its tiles.
+                let share = if voxels < 100.0 { 5 } else { 100 };
+                assert!(
+                    none < points / share,
+                    "{name} {voxels}: {none} of {points} have no cell"
+                );
             }
         }
     }

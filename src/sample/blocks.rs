@@ -5,7 +5,7 @@
 //! than the distance's own error are asked one by one.
 
 use super::bits;
-use super::lookup::{CHUNK, LANES, Lanes, LayerView, Points, look_up};
+use super::lookup::{CHUNK, LANES, Lanes, LayerView, Points, look_up, look_up_ridge};
 use crate::math::Kernel;
 use crate::region::CellTable;
 
@@ -98,7 +98,11 @@ impl BlockLayer<'_> {
                         continue;
                     }
                     let Some(&part) = SIDES.get(n + 1) else {
-                        if ask(i as usize, j as usize) {
+                        let at = [f64::from(i), f64::from(j)];
+                        let inside = look_up_ridge(self.table, self.view, at)
+                            .filter(|d| d.abs() >= limit)
+                            .map_or_else(|| ask(i as usize, j as usize), |d| d < 0.0);
+                        if inside {
                             let at = j as usize * self.size[0] + i as usize;
                             bits::flip(words, at, at + 1);
                         }

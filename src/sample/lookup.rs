@@ -97,6 +97,68 @@ pub(super) fn look_up(
     }
 }
 
+/// The signed distance at one point of a layer where a ridge is near, from the nearest of its cell's circles; `None`
+/// where it has none.
+pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]) -> Option<f32> {
+    let (mut r, mut z, mut tile, mut cell) = ([0], [0], [0], [0]);
+    let (mut ar, mut az) = ([0.0], [0.0]);
+    any_places(&view, [&[i], &[j]], [&mut r, &mut z]);
+    let scale = Scale::new(table);
+    tile_numbers(&scale, [&r, &z], &mut tile);
+    tile[0] = table.tiles().0[tile[0] as usize];
+    cell_numbers(&scale, [&r, &z], &tile, &mut cell, [&mut ar, &mut az]);
+    let circles = table.ridge(&table.cells()[cell[0] as usize]);
+    let first = circles.first()?;
+    // As many lanes as there are circles; the others have the first.
+    let mut four = first.map(|number| [number; LANES]);
+    for (n, circle) in circles.iter().enumerate() {
+        for (numbers, number) in four.iter_mut().zip(circle) {
+            numbers[n] = *number;
+        }
+    }
+    let values = distances(&four, [&[ar[0]; LANES], &[az[0]; LANES]], &scale.factors);
+    let nearer = |a: f32, b: f32| if b.abs() < a.abs() { b } else { a };
+    Some(values.into_iter().fold(f32::INFINITY, nearer))
+}
+
+/// What turns places into numbers of tiles and cells, and cells into distances.
+struct Scale {
+    bits: u32,
+    /// A place in steps.
+    place: f32,
+    /// Tiles along r, and the last of all.
+    across: u32,
+    last: u32,
+    /// The series' coefficients in scene units, and what the bits of a lost part stand for.
+    factors: [f32; 6],
+}
+
+impl Scale {
+    #[inline(always)]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a length, rounded once; tiles are counted in u32"
+    )]
+    fn new(table: &CellTable) -> Self {
+        let (tiles, across) = table.tiles();
+        let step = table.step() as f32;
+        Self {
+            bits: table.bits(),
+            place: (1.0 / f64::from(1_u32 << table.bits())) as f32,
+            across,
+            last: tiles.len() as u32 - 1,
+            factors: [
+                step,
+                -step,
+                2.0 * step,
+                -5.0 * step,
+                14.0 * step,
+                table.lost(),
+            ],
+        }
+    }
+}
+
 struct LookUp<'a> {
     table: &'a CellTable,
     view: LayerView,
@@ -170,54 +232,48 @@ impl LookUp<'_> {
             out,
             doubts,
         } = self;
-        let bits = table.bits();
-        let (tiles, across) = table.tiles();
-        let last = tiles.len() as u32 - 1;
+        let scale = Scale::new(table);
+        let (tiles, _) = table.tiles();
         let cells = table.cells();
-        let size = 1.0 / (1_u32 << bits) as f32;
-        let factors = factors(table);
-        let outs = out.chunks_mut(CHUNK).zip(doubts.chunks_mut(CHUNK / LANES));
+        let Lanes {
+            r,
+            z,
+            tile,
+            cell,
+            away: [ar, az],
+        } = lanes;
+        let outs = out
+            .chunks_mut(CHUNK)
+            .zip(doubts.chunks_mut(CHUNK / LANES));
         for (chunk, (out, doubts)) in outs.enumerate() {
             let count = out.len();
+            let (r, z) = (&mut r[..count], &mut z[..count]);
+            let (tile, cell) = (&mut tile[..count], &mut cell[..count]);
+            let (ar, az) = (&mut ar[..count], &mut az[..count]);
+            let first = chunk * CHUNK;
             match points {
-                Points::Row(j) => row_places(&view, j, chunk * CHUNK, count, lanes),
+                Points::Row(j) => row_places(&view, j, first, [&mut *r, &mut *z]),
                 Points::Any(i, j) => {
-                    let range = chunk * CHUNK..chunk * CHUNK + count;
-                    any_places(&view, &i[range.clone()], &j[range], lanes);
+                    let range = first..first + count;
+                    any_places(&view, [&i[range.clone()], &j[range]], [&mut *r, &mut *z]);
                 }
             }
-            tile_numbers(bits, across, last, count, lanes);
-            for tile in &mut lanes.tile[..count] {
+            tile_numbers(&scale, [r, z], tile);
+            for tile in &mut *tile {
                 *tile = tiles[*tile as usize];
             }
-            cell_numbers(bits, size, count, lanes);
+            cell_numbers(&scale, [r, z], tile, cell, [&mut *ar, &mut *az]);
             let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(doubts);
-            let numbers = lanes.cell.as_chunks::<LANES>().0.iter();
-            let [ar, az] = &lanes.away;
+            let numbers = cell.as_chunks::<LANES>().0.iter();
             let away = ar.as_chunks::<LANES>().0.iter().zip(az.as_chunks::<LANES>().0);
             for (((out, doubts), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
                 let four = block.collect(cells, numbers);
-                let values = distances(&four, [ar, az], &factors);
+                let values = distances(&four, [ar, az], &scale.factors);
                 *doubts = block.doubts(&values, least);
                 *out = values;
             }
         }
     }
-}
-
-/// The series' coefficients in scene units, and what the bits of a lost part stand for.
-#[inline(always)]
-#[allow(clippy::cast_possible_truncation, reason = "a length, rounded once")]
-fn factors(table: &CellTable) -> [f32; 6] {
-    let step = table.step() as f32;
-    [
-        step,
-        -step,
-        2.0 * step,
-        -5.0 * step,
-        14.0 * step,
-        table.lost(),
-    ]
 }
 
 #[inline(always)]
@@ -229,59 +285,74 @@ fn place(v: f64) -> u32 {
 /// Places of voxels of row `j`.
 #[inline(always)]
 #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-fn row_places(view: &LayerView, j: f64, first: usize, count: usize, lanes: &mut Lanes) {
-    let LayerView { x, y, z, base } = *view;
+fn row_places(view: &LayerView, j: f64, first: usize, [r, z]: [&mut [u32]; 2]) {
+    let LayerView {
+        x,
+        y,
+        z: height,
+        base,
+    } = *view;
     let start = first as f64;
-    let (x0, z0, y0) = (x[0] + j * x[2], z[0] + j * z[2], y[0] + j * y[1]);
+    let (x0, z0, y0) = (x[0] + j * x[2], height[0] + j * height[2], y[0] + j * y[1]);
     let y2 = y0 * y0;
-    let (to_r, to_z) = (&mut lanes.r[..count], &mut lanes.z[..count]);
+    let count = r.len();
+    let z = &mut z[..count];
     for n in 0..count {
         let i = start + f64::from(n as u32);
         let x = x0 + i * x[1];
-        to_r[n] = place((x * x + y2).sqrt() - base);
-        to_z[n] = place(z0 + i * z[1]);
+        r[n] = place((x * x + y2).sqrt() - base);
+        z[n] = place(z0 + i * height[1]);
     }
 }
 
 /// Places of any points.
 #[inline(always)]
-fn any_places(view: &LayerView, i: &[f64], j: &[f64], lanes: &mut Lanes) {
-    let LayerView { x, y, z, base } = *view;
+fn any_places(view: &LayerView, [i, j]: [&[f64]; 2], [r, z]: [&mut [u32]; 2]) {
+    let LayerView {
+        x,
+        y,
+        z: height,
+        base,
+    } = *view;
     let count = i.len();
-    let (to_r, to_z, j) = (&mut lanes.r[..count], &mut lanes.z[..count], &j[..count]);
+    let (r, z, j) = (&mut r[..count], &mut z[..count], &j[..count]);
     for n in 0..count {
         let x = (x[0] + j[n] * x[2]) + i[n] * x[1];
         let y = y[0] + j[n] * y[1];
-        to_r[n] = place((x * x + y * y).sqrt() - base);
-        to_z[n] = place((z[0] + j[n] * z[2]) + i[n] * z[1]);
+        r[n] = place((x * x + y * y).sqrt() - base);
+        z[n] = place((height[0] + j[n] * height[2]) + i[n] * height[1]);
     }
 }
 
 /// Tiles of places. What fills up the last block may be anywhere: it takes any tile.
 #[inline(always)]
-fn tile_numbers(bits: u32, across: u32, last: u32, count: usize, lanes: &mut Lanes) {
-    let (r, z, tile) = (
-        &lanes.r[..count],
-        &lanes.z[..count],
-        &mut lanes.tile[..count],
-    );
-    let shift = bits + TILE;
+fn tile_numbers(scale: &Scale, [r, z]: [&[u32]; 2], tile: &mut [u32]) {
+    let count = tile.len();
+    let (r, z) = (&r[..count], &z[..count]);
+    let shift = scale.bits + TILE;
     for n in 0..count {
-        let row = z[n].wrapping_shr(shift).wrapping_mul(across);
-        tile[n] = row.wrapping_add(r[n].wrapping_shr(shift)).min(last);
+        let row = z[n].wrapping_shr(shift).wrapping_mul(scale.across);
+        tile[n] = row.wrapping_add(r[n].wrapping_shr(shift)).min(scale.last);
     }
 }
 
+/// Cells of places in their tiles, and the ways from the cells' centres, in steps.
 #[inline(always)]
 #[allow(
     clippy::cast_precision_loss,
     reason = "at most 22 bits and the sign"
 )]
-fn cell_numbers(bits: u32, size: f32, count: usize, lanes: &mut Lanes) {
-    let (r, z, tile) = (&lanes.r[..count], &lanes.z[..count], &lanes.tile[..count]);
-    let [ar, az] = &mut lanes.away;
-    let (cell, ar, az) = (&mut lanes.cell[..count], &mut ar[..count], &mut az[..count]);
-    let side = bits + TILE;
+fn cell_numbers(
+    scale: &Scale,
+    [r, z]: [&[u32]; 2],
+    tile: &[u32],
+    cell: &mut [u32],
+    [ar, az]: [&mut [f32]; 2],
+) {
+    let count = cell.len();
+    let (r, z, tile) = (&r[..count], &z[..count], &tile[..count]);
+    let (ar, az) = (&mut ar[..count], &mut az[..count]);
+    let side = scale.bits + TILE;
     let in_tile = (1_u32 << side) - 1;
     for n in 0..count {
         let level = tile[n] & ((1 << LEVEL_BITS) - 1);
@@ -293,9 +364,8 @@ fn cell_numbers(bits: u32, size: f32, count: usize, lanes: &mut Lanes) {
             .wrapping_add(r.wrapping_shr(shift));
         let in_cell = 1_u32.wrapping_shl(shift).wrapping_sub(1);
         let half = (in_cell >> 1).wrapping_add(1);
-        let away = |c: u32| (c & in_cell).wrapping_sub(half).cast_signed() as f32 * size;
-        ar[n] = away(r);
-        az[n] = away(z);
+        ar[n] = (r & in_cell).wrapping_sub(half).cast_signed() as f32 * scale.place;
+        az[n] = (z & in_cell).wrapping_sub(half).cast_signed() as f32 * scale.place;
     }
 }
 

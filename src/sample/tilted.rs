@@ -2,8 +2,8 @@
 //!
 //! A voxel's distance depends on its radius and height in the body's frame. One table of small cells over those
 //! ([`CellTable`]) serves the whole grid; rows and points of a layer look their distances up ([`super::lookup`]). What
-//! the table does not hold to the stored precision is mended voxel by voxel: from the features of the field's leaf where
-//! the distance has a ridge or is bent too much, by the exact path where the surface is so near that the sign is in
+//! the table does not hold to the stored precision is mended voxel by voxel: from the circles on both sides where the
+//! distance has a ridge, from the features of the field's leaf where it is bent too much, by the exact path where the surface is so near that the sign is in
 //! question.
 //!
 //! ```text
@@ -20,7 +20,7 @@
 use super::bits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
-use super::lookup::{LANES, Lanes, LayerView, Points, look_up};
+use super::lookup::{LANES, Lanes, LayerView, Points, look_up, look_up_ridge};
 use super::memory::copy_past_caches;
 use super::radial::{KnownLayer, Writing};
 use crate::grid::GridSpec;
@@ -252,8 +252,12 @@ impl TiltedSampler {
                     break;
                 }
                 if row[i].is_nan() {
-                    let side = bits::get(inside, j * row.len() + i);
-                    if let Some(distance) = self.mended(view, [i, j]) {
+                    #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+                    let at = [i as f64, j as f64];
+                    if let Some(distance) = look_up_ridge(&self.table, view, at) {
+                        row[i] = distance;
+                    } else if let Some(distance) = self.mended(view, at) {
+                        let side = bits::get(inside, j * row.len() + i);
                         row[i] = stored(signed(distance, side));
                     }
                 }
@@ -266,13 +270,11 @@ impl TiltedSampler {
 
     /// The unsigned distance of a voxel, in scene units, from the features of its leaf.
     #[allow(
-        clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "voxel numbers are below 2^31; places are within the lattice"
+        reason = "places are within the lattice"
     )]
-    fn mended(&self, view: LayerView, [i, j]: [usize; 2]) -> Option<f64> {
-        let (i, j) = (i as f64, j as f64);
+    fn mended(&self, view: LayerView, [i, j]: [f64; 2]) -> Option<f64> {
         let x = view.x[0] + j * view.x[2] + i * view.x[1];
         let y = view.y[0] + j * view.y[1];
         let away = [
