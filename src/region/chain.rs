@@ -12,6 +12,16 @@
 //! ```
 //!
 //! The region lies on the left of every arc, so the distance is negative there.
+//!
+//! Beyond a joint the next feature answers. Its distance and that of the feature before agree on the joint's normal
+//! with their gradients, so that they differ by an integral of the jump of their bends:
+//!
+//! ```text
+//!   |Δd| <= x²/2 |b₁ - b₂|    x from the normal, b = κ / (1 - κ y) at the point's height y along the normal,
+//!                             -1/y for a corner
+//! ```
+//!
+//! Source: with the joint's normal at height y as origin `∂d/∂b = x² / (S (S + 1))`, `S = sqrt(1 + b² x²) >= 1`.
 
 use super::arcs::{Arc, arcs, cross, dot, minus};
 use super::boundary::BoundaryPiece;
@@ -63,6 +73,8 @@ pub(crate) struct Local {
 
 /// Sine of the angle below which two tangents count as one: the distance errs by its square.
 const SMOOTH: f64 = 1e-7;
+/// Joints that [`Chain::departure`] follows to either side.
+const MOST_JOINTS: usize = 16;
 /// Least share of the radius of curvature that a box keeps from the centre, on the hollow side.
 const CLEAR: f64 = 0.05;
 
@@ -276,6 +288,71 @@ impl Chain {
     fn short_of(&self, feature: u32, q: [f64; 2]) -> Option<u32> {
         let f = &self.features[feature as usize];
         (f.before < AXIS && dot(f.arc.from, minus(q, f.arc.start)) < 0.0).then_some(f.before)
+    }
+
+    /// A bound on what [`local`](Self::local) of a feature, nearest to some point of a box, differs by from the signed
+    /// distance to its run, over the box (its corners are given). The run is smooth in it.
+    pub(crate) fn departure(&self, feature: u32, corners: &[[f64; 2]; 4]) -> f64 {
+        let way = |ahead: bool| {
+            let mut sum = 0.0;
+            let mut at = feature;
+            for _ in 0..MOST_JOINTS {
+                let f = &self.features[at as usize];
+                let (next, along, joint) = if ahead {
+                    (f.after, f.arc.to, f.arc.end)
+                } else {
+                    (f.before, f.arc.from.map(|c| -c), f.arc.start)
+                };
+                // A joint that no point is beyond is the last: who is beyond the next is beyond this one.
+                let beyond = |p: &[f64; 2]| dot(along, minus(*p, joint));
+                let furthest = corners.iter().map(beyond).fold(0.0, f64::max);
+                if next >= AXIS || furthest <= 0.0 {
+                    return sum;
+                }
+                let normal = if ahead {
+                    [-along[1], along[0]]
+                } else {
+                    [along[1], -along[0]]
+                };
+                let heights = corners.map(|p| dot(normal, minus(p, joint)));
+                let jump = self.jump([at, next], heights);
+                sum += furthest * (0.5 * furthest * jump + SMOOTH);
+                at = next;
+            }
+            f64::INFINITY
+        };
+        way(true) + way(false)
+    }
+
+    /// The largest difference of the bends of two features that meet, at some heights along their normal.
+    fn jump(&self, meeting: [u32; 2], heights: [f64; 4]) -> f64 {
+        let [a, b] = meeting.map(|i| &self.features[i as usize]);
+        let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Least 1 - κ y, which is linear.
+        let room = |f: &Feature| {
+            let k = f.arc.curvature;
+            (1.0 - k * low).min(1.0 - k * high)
+        };
+        let jump = match [a.corner, b.corner].map(|c| c != 0.0) {
+            [false, false] => {
+                let (p, q) = (room(a), room(b));
+                if p <= 0.0 || q <= 0.0 {
+                    return f64::INFINITY;
+                }
+                (a.arc.curvature - b.arc.curvature).abs() / (p * q)
+            }
+            [true, true] => f64::INFINITY,
+            [first, _] => {
+                let p = room(if first { b } else { a });
+                if p <= 0.0 || low <= 0.0 && high >= 0.0 {
+                    return f64::INFINITY;
+                }
+                1.0 / (low.abs().min(high.abs()) * p)
+            }
+        };
+        // A hair more covers its own rounding.
+        jump * (1.0 + 1e-9)
     }
 
     /// The neighbour of a feature on the way to another that is a few features away.

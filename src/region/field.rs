@@ -145,6 +145,30 @@ impl MeridianField {
         (self.size[0] as usize, self.first[0])
     }
 
+    /// Cells along r and z, and the lower corner of the first.
+    pub(crate) fn lattice(&self) -> ([u32; 2], [f64; 2]) {
+        (self.size, self.corner([0, 0]))
+    }
+
+    /// The leaf that covers a cell, and its level: it is 2^level cells wide.
+    pub(crate) fn leaf_at(&self, at: [u32; 2]) -> Option<(u32, u32)> {
+        let (mut node, mut level) = (self.root, self.levels);
+        if at.iter().any(|c| c >> level != 0) {
+            return None;
+        }
+        loop {
+            match node {
+                Node::Empty => return None,
+                Node::Leaf(leaf) => return Some((leaf, level)),
+                Node::Quarters(index) => {
+                    level -= 1;
+                    let [r, z] = at.map(|c| (c >> level) & 1);
+                    node = self.quarters[index as usize][(2 * z + r) as usize];
+                }
+            }
+        }
+    }
+
     /// The features kept of a smooth leaf, none of another.
     pub(crate) fn features(&self, leaf: &Leaf) -> &[u32] {
         if leaf.smooth {

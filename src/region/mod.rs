@@ -9,11 +9,13 @@
 //!   curves ──> pieces ──┬──> crossings   is a point of the half-plane inside?
 //!                       └──> boundary ──┬──> distance    how far is it?
 //!                                       ├──> moments     how much is it?
-//!                                       └──> arcs ──> chain ──> field ──> radial    how far, for many at once?
+//!                                       └──> arcs ──> chain ──> field ──┬──> radial   how far, for many at once?
+//!                                                                  └──> cells
 //! ```
 
 mod arcs;
 mod boundary;
+mod cells;
 mod chain;
 mod crossings;
 mod curve;
@@ -36,6 +38,7 @@ pub use error::RegionError;
 pub use profile::{Boundary, Fill, ProfileLoop, Region};
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
+pub(crate) use cells::{CellTable, LEVEL_BITS, LOST_BITS, TILE};
 pub(crate) use chain::Chain;
 pub(crate) use crossings::MeridianPoint;
 pub(crate) use curve::{HomogeneousPoint, beziers};

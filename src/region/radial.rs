@@ -328,7 +328,7 @@ fn smooth_error(h: f64, bend: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::region::{
         Boundary, BoundaryPiece, Chain, DistanceSet, Extent, Fill, MeridianField, ProfileCurve,
@@ -374,7 +374,7 @@ mod tests {
     }
 
     /// Profiles with arcs, free curves, inflections, corners of both kinds, tips on the axis and thin walls.
-    fn regions() -> Vec<(&'static str, Region)> {
+    pub(in crate::region) fn regions() -> Vec<(&'static str, Region)> {
         let region = |loops: &[ProfileLoop], boundary| {
             Region::new(loops, boundary, Fill::EvenOdd).expect("a region")
         };
@@ -458,7 +458,7 @@ mod tests {
         ]
     }
 
-    fn swept(region: &Region) -> Vec<BoundaryPiece> {
+    pub(in crate::region) fn swept(region: &Region) -> Vec<BoundaryPiece> {
         (region.boundary().iter())
             .filter(|b| !b.piece.on_axis)
             .cloned()
@@ -466,7 +466,7 @@ mod tests {
     }
 
     /// Numbers from 0 to 1, always the same.
-    fn numbers(mut state: u64) -> impl FnMut() -> f64 {
+    pub(in crate::region) fn numbers(mut state: u64) -> impl FnMut() -> f64 {
         move || {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)

@@ -6,6 +6,7 @@ use super::memory::expand_past_caches;
 use super::partial::{PartialSampler, PartialScratch};
 use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
 use super::tally::{Certainty, Tally};
+use super::tilted::{TiltedSampler, TiltedScratch};
 use super::upright::{UprightBody, UprightScratch};
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Side};
@@ -95,6 +96,8 @@ pub struct LayerSampler<'a> {
     /// The distances of such a body, fully turned or not.
     radial: Option<RadialSampler>,
     partial: Option<PartialSampler>,
+    /// Both of the one body that is turned about another axis.
+    tilted: Option<TiltedSampler>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -114,6 +117,7 @@ pub(super) struct LayerScratch {
     upright: UprightScratch,
     radial: RadialScratch,
     partial: PartialScratch,
+    tilted: TiltedScratch,
 }
 
 /// What is left to the rows.
@@ -163,6 +167,7 @@ impl<'a> LayerSampler<'a> {
         let body = assembly.single().and_then(Body::revolved);
         let upright = body.and_then(|b| UprightBody::new(b, grid));
         let radial = body.filter(|_| selection.sdf && upright.is_some());
+        let tilted = body.filter(|b| !b.rows().is_upright());
         Self {
             cancel: None,
             assembly,
@@ -176,6 +181,7 @@ impl<'a> LayerSampler<'a> {
             upright,
             radial: radial.and_then(|b| RadialSampler::new(b, grid)),
             partial: radial.and_then(|b| PartialSampler::new(b, grid)),
+            tilted: tilted.and_then(|b| TiltedSampler::new(b, grid)),
         }
     }
 
@@ -191,6 +197,7 @@ impl<'a> LayerSampler<'a> {
         Self {
             radial: None,
             partial: None,
+            tilted: None,
             ..self
         }
     }
@@ -333,19 +340,29 @@ impl<'a> LayerSampler<'a> {
         Some((self.assembly.single()?.revolved()?, self.upright.as_ref()?))
     }
 
+    /// The one body that is turned about an axis of its own.
+    fn tilted_body(&self) -> Option<(&Revolved, &TiltedSampler)> {
+        Some((self.assembly.single()?.revolved()?, self.tilted.as_ref()?))
+    }
+
     /// The bits of layer `k`, where they are found in whole layers.
     fn layer_bits(&self, k: usize, scratch: &mut LayerScratch) -> bool {
-        let Some((body, upright)) = self.upright_body() else {
+        if !self.fills_occupancy() {
             return false;
-        };
+        }
         let LayerScratch {
             inside,
             upright: own,
+            tilted: turned,
             ..
         } = scratch;
         inside.clear();
         inside.resize(bits::words_for(self.grid.layer_len()), 0);
-        upright.layer(self.kernel, body, self.grid, k, own, inside);
+        if let Some((body, upright)) = self.upright_body() {
+            upright.layer(self.kernel, body, self.grid, k, own, inside);
+        } else if let Some((body, tilted)) = self.tilted_body() {
+            tilted.bits(self.kernel, body, self.grid, k, turned, inside);
+        }
         true
     }
 
@@ -357,9 +374,6 @@ impl<'a> LayerSampler<'a> {
         out: &mut [f32],
         past_caches: bool,
     ) -> bool {
-        let Some((body, _)) = self.upright_body() else {
-            return false;
-        };
         let writing = Writing {
             kernel: self.kernel,
             cancel: self.cancel,
@@ -370,9 +384,17 @@ impl<'a> LayerSampler<'a> {
             inside,
             radial: own,
             partial: own_partial,
+            tilted: turned,
             ..
         } = scratch;
         let known = KnownLayer { k, inside };
+        if let Some((body, tilted)) = self.tilted_body() {
+            tilted.layer(body, self.grid, known, writing, turned, out);
+            return true;
+        }
+        let Some((body, _)) = self.upright_body() else {
+            return false;
+        };
         if let Some(radial) = &self.radial {
             radial.layer(body, self.grid, known, writing, own, out);
         } else if let Some(partial) = &self.partial {
@@ -416,12 +438,12 @@ impl<'a> LayerSampler<'a> {
 
     /// Whether [`occupancy_into`](Self::occupancy_into) serves.
     pub(super) fn fills_occupancy(&self) -> bool {
-        self.upright.is_some()
+        self.upright.is_some() || self.tilted.is_some()
     }
 
     /// Whether [`distance_into`](Self::distance_into) serves.
     pub(super) fn fills_distance(&self) -> bool {
-        self.radial.is_some() || self.partial.is_some()
+        self.radial.is_some() || self.partial.is_some() || self.tilted.is_some()
     }
 
     /// Fills one layer of occupancy in a large buffer.

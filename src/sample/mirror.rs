@@ -126,8 +126,9 @@ mod tests {
                             found.push(rows.value());
                         }
                         let order = if descending { [3, 2, 1] } else { [1, 2, 3] };
-                        let wanted = order.iter().flat_map(|row| {
-                            (0..columns).map(|i| {
+                        let wanted = order.into_iter().flat_map(|row| {
+                            let values = &values;
+                            (0..columns).map(move |i| {
                                 let i = if i < stored { i } else { columns - 1 - i };
                                 values[row * padded + i]
                             })

@@ -5,21 +5,26 @@
 //! by row. Layers do not depend on each other: any number of threads gives the same values.
 //!
 //! One body with an axis parallel to grid z goes a quicker way, to the same membership and to distances within
-//! max(2 ulp, 1e-4 of the least spacing):
+//! max(2 ulp, 1e-4 of the least spacing); so does one that is turned fully about any other axis:
 //!
 //! ```text
 //!   upright   rings of a layer ──> ends of all rows ──> bits, 64 voxels a word ──> bytes
 //!   plane     radii of a layer's voxels, once for the grid
 //!   radial    a table of cubics over the radii of a layer ──spread──> rows
 //!   partial   the same for less than a full turn, with a second table along its caps
+//!   lookup    distances from a table of cells, for rows and points of a layer
+//!   blocks    squares of a layer, divided where the surface is near ──> bits
+//!   tilted    ties these to a body and its table
 //!   memory    stores past the caches, large pages
 //! ```
 
 mod bits;
+mod blocks;
 mod caps;
 mod divided;
 mod fraction;
 mod layer;
+mod lookup;
 mod memory;
 mod mirror;
 mod partial;
@@ -28,6 +33,7 @@ mod queue;
 mod radial;
 mod spread;
 mod tally;
+mod tilted;
 mod upright;
 mod volume;
 

@@ -1,0 +1,442 @@
+//! Distances of voxels from a table of cells, by lanes.
+//!
+//! Voxel centres, rows of them or any points of a layer, become places of the half-plane; each place finds its cell by
+//! two look-ups; the cell's circle gives the distance ([`CellTable`]).
+//!
+//! ```text
+//!   r = sqrt(x² + y²), z  ──> fixed point ──> tile ──> cell ──> q from its centre ──> distance
+//! ```
+//!
+//! The axis frame is turned so that y stays the same along a row. Places are rounded once, from f64, by half a place at
+//! most; what follows of them is exact but for the sum of some numbers of a cell's size.
+//!
+//! The plain loops are the definition; compiled for wider lanes they do the same operations in the same order.
+
+use crate::math::Kernel;
+use crate::region::{CellTable, LEVEL_BITS, LOST_BITS, TILE};
+#[cfg(target_arch = "x86_64")]
+use pulp::Arch;
+
+/// Voxels that go through each step together: their numbers stay in the nearest cache.
+pub(super) const CHUNK: usize = 256;
+/// Voxels of a block; chunks are filled up to whole ones.
+pub(super) const LANES: usize = 16;
+/// Added to a number below 2^31, leaves its nearest integer in the lowest bits of the sum.
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
+/// A layer of voxels as places see it: linear in i and j.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LayerView {
+    /// Across the axis, along the rows.
+    pub(super) x: [f64; 3],
+    /// Across both.
+    pub(super) y: [f64; 2],
+    /// Along the axis, from the lattice's corner.
+    pub(super) z: [f64; 3],
+    /// Radius of the lattice's corner.
+    pub(super) base: f64,
+}
+
+/// The points whose distances are wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Points<'a> {
+    /// The voxels of a row, from the first on.
+    Row(f64),
+    /// Points of the layer: i and j, whole or not.
+    Any(&'a [f64], &'a [f64]),
+}
+
+/// What one thread reuses.
+#[derive(Debug)]
+pub(super) struct Lanes {
+    r: [u32; CHUNK],
+    z: [u32; CHUNK],
+    tile: [u32; CHUNK],
+    cell: [u32; CHUNK],
+    /// From the cell's centre, in steps.
+    away: [[f32; CHUNK]; 2],
+}
+
+impl Default for Lanes {
+    fn default() -> Self {
+        Self {
+            r: [0; CHUNK],
+            z: [0; CHUNK],
+            tile: [0; CHUNK],
+            cell: [0; CHUNK],
+            away: [[0.0; CHUNK]; 2],
+        }
+    }
+}
+
+/// Fills `out` with the signed distances of points of a layer, NaN where the table has none, and sets in `doubts` a bit
+/// for each that is NaN or nearer to 0 than `least`. Both have room for whole blocks, which may be filled.
+pub(super) fn look_up(
+    kernel: Kernel,
+    table: &CellTable,
+    view: LayerView,
+    points: Points<'_>,
+    least: f32,
+    lanes: &mut Lanes,
+    (out, doubts): (&mut [f32], &mut [u16]),
+) {
+    let job = LookUp {
+        table,
+        view,
+        points,
+        least,
+        lanes,
+        out,
+        doubts,
+    };
+    match kernel.lanes() {
+        None => job.run(&Plain),
+        #[cfg(target_arch = "x86_64")]
+        Some(Arch::V4(simd)) => simd.vectorize(Wide512(simd, job)),
+        Some(arch) => arch.dispatch(Wide(job)),
+    }
+}
+
+/// The signed distance at one point of a layer where a ridge is near, from the nearest of its cell's circles; `None`
+/// where it has none.
+pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]) -> Option<f32> {
+    let (mut r, mut z, mut tile, mut cell) = ([0], [0], [0], [0]);
+    let (mut ar, mut az) = ([0.0], [0.0]);
+    any_places(&view, [&[i], &[j]], [&mut r, &mut z]);
+    let scale = Scale::new(table);
+    tile_numbers(&scale, [&r, &z], &mut tile);
+    tile[0] = table.tiles().0[tile[0] as usize];
+    cell_numbers(&scale, [&r, &z], &tile, &mut cell, [&mut ar, &mut az]);
+    let circles = table.ridge(&table.cells()[cell[0] as usize]);
+    let first = circles.first()?;
+    // As many lanes as there are circles; the others have the first.
+    let mut four = first.map(|number| [number; LANES]);
+    for (n, circle) in circles.iter().enumerate() {
+        for (numbers, number) in four.iter_mut().zip(circle) {
+            numbers[n] = *number;
+        }
+    }
+    let values = distances(&four, [&[ar[0]; LANES], &[az[0]; LANES]], &scale.factors);
+    let nearer = |a: f32, b: f32| if b.abs() < a.abs() { b } else { a };
+    Some(values.into_iter().fold(f32::INFINITY, nearer))
+}
+
+/// What turns places into numbers of tiles and cells, and cells into distances.
+struct Scale {
+    bits: u32,
+    /// A place in steps.
+    place: f32,
+    /// Tiles along r, and the last of all.
+    across: u32,
+    last: u32,
+    /// The series' coefficients in scene units, and what the bits of a lost part stand for.
+    factors: [f32; 6],
+}
+
+impl Scale {
+    #[inline(always)]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "a length, rounded once; tiles are counted in u32"
+    )]
+    fn new(table: &CellTable) -> Self {
+        let (tiles, across) = table.tiles();
+        let step = table.step() as f32;
+        Self {
+            bits: table.bits(),
+            place: (1.0 / f64::from(1_u32 << table.bits())) as f32,
+            across,
+            last: tiles.len() as u32 - 1,
+            factors: [
+                step,
+                -step,
+                2.0 * step,
+                -5.0 * step,
+                14.0 * step,
+                table.lost(),
+            ],
+        }
+    }
+}
+
+struct LookUp<'a> {
+    table: &'a CellTable,
+    view: LayerView,
+    points: Points<'a>,
+    least: f32,
+    lanes: &'a mut Lanes,
+    out: &'a mut [f32],
+    doubts: &'a mut [u16],
+}
+
+/// The compiler's own lanes.
+struct Wide<'a>(LookUp<'a>);
+
+impl pulp::NullaryFnOnce for Wide<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.run(&Plain);
+    }
+}
+
+/// The cells of a block: four numbers of each.
+type Four = [[u32; LANES]; 4];
+
+/// What the compiler does not find lanes for by itself.
+trait Block {
+    /// The cells of a block.
+    fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four;
+
+    /// A bit for each value that is NaN or nearer to 0 than `least`.
+    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16;
+}
+
+/// One by one.
+struct Plain;
+
+impl Block for Plain {
+    #[inline(always)]
+    fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four {
+        let mut four = [[0; LANES]; 4];
+        for n in 0..LANES {
+            let [a, b, c, d] = cells[numbers[n] as usize];
+            four[0][n] = a;
+            four[1][n] = b;
+            four[2][n] = c;
+            four[3][n] = d;
+        }
+        four
+    }
+
+    #[inline(always)]
+    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16 {
+        let mut mask = 0;
+        for n in 0..LANES {
+            mask |= u16::from(!(values[n].abs() >= least)) << n;
+        }
+        mask
+    }
+}
+
+impl LookUp<'_> {
+    #[inline(always)]
+    fn run(self, block: &impl Block) {
+        let Self {
+            table,
+            view,
+            points,
+            least,
+            lanes,
+            out,
+            doubts,
+        } = self;
+        let scale = Scale::new(table);
+        let (tiles, _) = table.tiles();
+        let cells = table.cells();
+        let Lanes {
+            r,
+            z,
+            tile,
+            cell,
+            away: [ar, az],
+        } = lanes;
+        let outs = out.chunks_mut(CHUNK).zip(doubts.chunks_mut(CHUNK / LANES));
+        for (chunk, (out, doubts)) in outs.enumerate() {
+            let count = out.len();
+            let (r, z) = (&mut r[..count], &mut z[..count]);
+            let (tile, cell) = (&mut tile[..count], &mut cell[..count]);
+            let (ar, az) = (&mut ar[..count], &mut az[..count]);
+            let first = chunk * CHUNK;
+            match points {
+                Points::Row(j) => row_places(&view, j, first, [&mut *r, &mut *z]),
+                Points::Any(i, j) => {
+                    let range = first..first + count;
+                    any_places(&view, [&i[range.clone()], &j[range]], [&mut *r, &mut *z]);
+                }
+            }
+            tile_numbers(&scale, [r, z], tile);
+            for tile in &mut *tile {
+                *tile = tiles[*tile as usize];
+            }
+            cell_numbers(&scale, [r, z], tile, cell, [&mut *ar, &mut *az]);
+            let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(doubts);
+            let numbers = cell.as_chunks::<LANES>().0.iter();
+            let away = ar
+                .as_chunks::<LANES>()
+                .0
+                .iter()
+                .zip(az.as_chunks::<LANES>().0);
+            for (((out, doubts), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
+                let four = block.collect(cells, numbers);
+                let values = distances(&four, [ar, az], &scale.factors);
+                *doubts = block.doubts(&values, least);
+                *out = values;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "the lowest bits are wanted"
+)]
+fn place(v: f64) -> u32 {
+    (v + ROUND).to_bits() as u32
+}
+
+/// Places of voxels of row `j`.
+#[inline(always)]
+#[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+fn row_places(view: &LayerView, j: f64, first: usize, [r, z]: [&mut [u32]; 2]) {
+    let LayerView {
+        x,
+        y,
+        z: height,
+        base,
+    } = *view;
+    let start = first as f64;
+    let (x0, z0, y0) = (x[0] + j * x[2], height[0] + j * height[2], y[0] + j * y[1]);
+    let y2 = y0 * y0;
+    let count = r.len();
+    let z = &mut z[..count];
+    for n in 0..count {
+        let i = start + f64::from(n as u32);
+        let x = x0 + i * x[1];
+        r[n] = place((x * x + y2).sqrt() - base);
+        z[n] = place(z0 + i * height[1]);
+    }
+}
+
+/// Places of any points.
+#[inline(always)]
+fn any_places(view: &LayerView, [i, j]: [&[f64]; 2], [r, z]: [&mut [u32]; 2]) {
+    let LayerView {
+        x,
+        y,
+        z: height,
+        base,
+    } = *view;
+    let count = i.len();
+    let (r, z, j) = (&mut r[..count], &mut z[..count], &j[..count]);
+    for n in 0..count {
+        let x = (x[0] + j[n] * x[2]) + i[n] * x[1];
+        let y = y[0] + j[n] * y[1];
+        r[n] = place((x * x + y * y).sqrt() - base);
+        z[n] = place((height[0] + j[n] * height[2]) + i[n] * height[1]);
+    }
+}
+
+/// Tiles of places. What fills up the last block may be anywhere: it takes any tile.
+#[inline(always)]
+fn tile_numbers(scale: &Scale, [r, z]: [&[u32]; 2], tile: &mut [u32]) {
+    let count = tile.len();
+    let (r, z) = (&r[..count], &z[..count]);
+    let shift = scale.bits + TILE;
+    for n in 0..count {
+        let row = z[n].wrapping_shr(shift).wrapping_mul(scale.across);
+        tile[n] = row.wrapping_add(r[n].wrapping_shr(shift)).min(scale.last);
+    }
+}
+
+/// Cells of places in their tiles, and the ways from the cells' centres, in steps.
+#[inline(always)]
+#[allow(clippy::cast_precision_loss, reason = "at most 22 bits and the sign")]
+fn cell_numbers(
+    scale: &Scale,
+    [r, z]: [&[u32]; 2],
+    tile: &[u32],
+    cell: &mut [u32],
+    [ar, az]: [&mut [f32]; 2],
+) {
+    let count = cell.len();
+    let (r, z, tile) = (&r[..count], &z[..count], &tile[..count]);
+    let (ar, az) = (&mut ar[..count], &mut az[..count]);
+    let side = scale.bits + TILE;
+    let in_tile = (1_u32 << side) - 1;
+    for n in 0..count {
+        let level = tile[n] & ((1 << LEVEL_BITS) - 1);
+        let shift = side - level;
+        let (r, z) = (r[n] & in_tile, z[n] & in_tile);
+        let row = z.wrapping_shr(shift).wrapping_shl(level);
+        cell[n] = (tile[n] >> LEVEL_BITS)
+            .wrapping_add(row)
+            .wrapping_add(r.wrapping_shr(shift));
+        let in_cell = 1_u32.wrapping_shl(shift).wrapping_sub(1);
+        let half = (in_cell >> 1).wrapping_add(1);
+        ar[n] = (r & in_cell).wrapping_sub(half).cast_signed() as f32 * scale.place;
+        az[n] = (z & in_cell).wrapping_sub(half).cast_signed() as f32 * scale.place;
+    }
+}
+
+/// The distances of a block.
+#[inline(always)]
+#[allow(clippy::cast_precision_loss, reason = "ten bits and the sign")]
+fn distances(four: &Four, away: [&[f32; LANES]; 2], factors: &[f32; 6]) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
+    let [f0, f1, f2, f3, f4, lost] = *factors;
+    for n in 0..LANES {
+        let [d, gr, gz, kept] = [four[0][n], four[1][n], four[2][n], four[3][n]];
+        let bend = f32::from_bits(kept & !((1 << LOST_BITS) - 1));
+        let rest = (kept << (32 - LOST_BITS)).cast_signed() as f32 * lost;
+        let (r, z) = (away[0][n], away[1][n]);
+        let linear = f32::from_bits(gr) * r + f32::from_bits(gz) * z;
+        let e = linear + bend * (r * r + z * z);
+        let v = bend * e;
+        let series = f0 + v * (f1 + v * (f2 + v * (f3 + v * f4)));
+        out[n] = f32::from_bits(d) + (rest + e * series);
+    }
+    out
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Wide512<'a>(pulp::x86::V4, LookUp<'a>);
+
+#[cfg(target_arch = "x86_64")]
+impl pulp::NullaryFnOnce for Wide512<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.1.run(&Transpose(self.0));
+    }
+}
+
+/// Cells in quarters of wide registers, transposed.
+#[cfg(target_arch = "x86_64")]
+struct Transpose(pulp::x86::V4);
+
+#[cfg(target_arch = "x86_64")]
+impl Block for Transpose {
+    #[inline(always)]
+    fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four {
+        let f = self.0.avx512f;
+        let mut lines = [f._mm512_setzero_si512(); 4];
+        for n in 0..4 {
+            lines[n] = pulp::cast([
+                cells[numbers[n] as usize],
+                cells[numbers[n + 4] as usize],
+                cells[numbers[n + 8] as usize],
+                cells[numbers[n + 12] as usize],
+            ]);
+        }
+        let [a, b, c, d] = lines;
+        let (p, q) = (f._mm512_unpacklo_epi32(a, b), f._mm512_unpackhi_epi32(a, b));
+        let (s, t) = (f._mm512_unpacklo_epi32(c, d), f._mm512_unpackhi_epi32(c, d));
+        [
+            pulp::cast(f._mm512_unpacklo_epi64(p, s)),
+            pulp::cast(f._mm512_unpackhi_epi64(p, s)),
+            pulp::cast(f._mm512_unpacklo_epi64(q, t)),
+            pulp::cast(f._mm512_unpackhi_epi64(q, t)),
+        ]
+    }
+
+    #[inline(always)]
+    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16 {
+        let f = self.0.avx512f;
+        let size = f._mm512_abs_ps(pulp::cast(*values));
+        f._mm512_cmp_ps_mask::<9>(size, f._mm512_set1_ps(least))
+    }
+}
