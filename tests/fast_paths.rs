@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 use voxlathe::Scene;
-use voxlathe::grid::GridSpec;
+use voxlathe::grid::{BitVolume, GridSpec};
 use voxlathe::math::{Kernel, SimdLevel};
 use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
 
@@ -224,6 +224,9 @@ fn compare(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
     sampler.fill_occupancy(&mut occupancy);
     sampler.fill_signed_distance(&mut sdf);
     let [nx, ny, nz] = grid.dims();
+    let mut words = vec![7; BitVolume::words_per_layer(grid) * nz];
+    sampler.fill_occupancy_bits(&mut words);
+    let bits = BitVolume::new(*grid, words);
     let spacing = grid.spacing().min_element();
     let mut worst = 0.0_f64;
     let mut at = 0;
@@ -236,6 +239,7 @@ fn compare(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
                     scene.assembly().signed_distance(p),
                 );
                 assert_eq!(occupancy[at] != 0, inside, "{name}: voxel ({i}, {j}, {k})");
+                assert_eq!(bits.get(i, j, k), inside, "{name}: bit ({i}, {j}, {k})");
                 let found = f64::from(sdf[at]);
                 assert_eq!(
                     found <= 0.0,

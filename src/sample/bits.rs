@@ -60,6 +60,13 @@ pub(crate) fn set(words: &mut [u64], at: usize, value: bool) {
     }
 }
 
+/// The bits of bytes that are 0 or 1.
+pub(crate) fn pack(bytes: &[u8], words: &mut [u64]) {
+    for (word, bytes) in words.iter_mut().zip(bytes.chunks(64)) {
+        *word = (bytes.iter().rev()).fold(0, |w, b| w << 1 | u64::from(*b != 0));
+    }
+}
+
 /// How many bits are set.
 pub(crate) fn count(words: &[u64]) -> u64 {
     words.iter().map(|w| u64::from(w.count_ones())).sum()
@@ -145,6 +152,9 @@ mod tests {
                     assert_eq!(*byte, u8::from(wanted), "{from}..{to} at {at}");
                     assert_eq!(get(&words, at), wanted);
                 }
+                let mut packed = vec![7; words.len()];
+                pack(&bytes, &mut packed);
+                assert_eq!(packed, words);
                 assert_eq!(
                     count(&words),
                     bytes.iter().map(|b| u64::from(*b)).sum::<u64>()

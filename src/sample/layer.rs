@@ -453,6 +453,16 @@ impl<'a> LayerSampler<'a> {
         }
     }
 
+    /// Fills one layer of occupancy as bits.
+    pub(super) fn bits_into(&self, k: usize, buffers: &mut LayerBuffers, out: &mut [u64]) {
+        if self.layer_bits(k, &mut buffers.scratch) {
+            out.copy_from_slice(&buffers.scratch.inside);
+        } else {
+            self.sample(k, buffers);
+            bits::pack(&buffers.occupancy, out);
+        }
+    }
+
     /// Fills one layer of distances in a large buffer.
     pub(super) fn distance_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [f32]) {
         if self.layer_bits(k, scratch) {

@@ -40,4 +40,4 @@ mod volume;
 pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
 pub use tally::{Certainty, Tally};
-pub use volume::{fraction, material, occupancy, signed_distance};
+pub use volume::{fraction, material, occupancy, occupancy_bits, signed_distance};

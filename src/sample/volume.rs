@@ -2,7 +2,7 @@
 
 use super::layer::{LayerBuffers, LayerSampler, LayerScratch, Selection};
 use super::memory::advise_large_pages;
-use crate::grid::{GridSpec, Volume};
+use crate::grid::{BitVolume, GridSpec, Volume};
 use crate::scene::Scene;
 use crate::solid::Assembly;
 use rayon::prelude::*;
@@ -60,6 +60,23 @@ impl LayerSampler<'_> {
         });
     }
 
+    /// Fills words with the occupancy of the whole grid, in parallel, a bit for each voxel as [`BitVolume`] has them.
+    ///
+    /// # Panics
+    /// When `out` does not have [`BitVolume::words_per_layer`] words for each layer.
+    pub fn fill_occupancy_bits(&self, out: &mut [u64]) {
+        let per_layer = BitVolume::words_per_layer(self.grid());
+        assert_eq!(
+            Some(out.len()),
+            per_layer.checked_mul(self.grid().dims()[2]),
+            "whole layers of words"
+        );
+        let layers = out.par_chunks_mut(per_layer).enumerate();
+        layers.for_each_init(LayerBuffers::default, |buffers, (k, layer)| {
+            self.bits_into(k, buffers, layer);
+        });
+    }
+
     /// Fills a buffer of one value for each voxel with the signed distances of the whole grid, in parallel. The
     /// sampler's selection must have [`Selection::sdf`].
     ///
@@ -95,6 +112,28 @@ pub fn occupancy(scene: &Scene, grid: &GridSpec) -> Result<Volume<u8>, crate::Er
     fits(grid, 1)?;
     let sampler = LayerSampler::new(scene.assembly(), grid, Selection::default());
     Ok(fresh(grid, |data| sampler.fill_occupancy(data)))
+}
+
+/// Occupancy of a scene's solid, a bit for each voxel.
+///
+/// # Errors
+/// [`crate::Error`] when the volume does not fit the address space.
+///
+/// # Examples
+/// ```
+/// let scene = voxlathe::Scene::parse("schema = 1\n[[solid]]\nkind = 'sphere'\nradius = 1\n")?;
+/// let grid = scene.grid()?;
+/// let bits = voxlathe::sample::occupancy_bits(&scene, &grid)?;
+/// let bytes = voxlathe::sample::occupancy(&scene, &grid)?;
+/// assert_eq!(bits.count(), bytes.data().iter().map(|v| u64::from(*v)).sum());
+/// # Ok::<(), voxlathe::Error>(())
+/// ```
+pub fn occupancy_bits(scene: &Scene, grid: &GridSpec) -> Result<BitVolume, crate::Error> {
+    fits(grid, 1)?;
+    let sampler = LayerSampler::new(scene.assembly(), grid, Selection::default());
+    let mut words = vec![0; BitVolume::words_per_layer(grid) * grid.dims()[2]];
+    sampler.fill_occupancy_bits(&mut words);
+    Ok(BitVolume::new(*grid, words))
 }
 
 /// Share of each voxel that the solid fills, within 1e-6.
