@@ -9,7 +9,7 @@ const WORD: usize = u64::BITS as usize;
 ///
 /// Every z layer begins with a word of its own. Voxel (i, j, k) is bit `j nx + i` of layer k, the lowest bit of a word
 /// first; the bits after a layer's last voxel are 0.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct BitVolume {
     grid: GridSpec,
     words: Vec<u64>,
