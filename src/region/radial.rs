@@ -30,6 +30,8 @@ pub(crate) struct RadialTable {
 
 /// Cells read beyond the last one by lanes that do not use them.
 pub(crate) const PADDING: usize = 32;
+/// Value of the columns that are left out: further away than anything, and its square is in range.
+pub(crate) const UNUSED: f32 = 1e30;
 /// Features that may follow each other within one cell.
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
@@ -40,11 +42,24 @@ const BENT: f64 = 0.25;
 impl RadialTable {
     /// Tabulates height `z` of a field whose unit is `scale` scene units, within `tolerance` region units.
     pub(crate) fn fill(&mut self, field: &MeridianField, z: f64, scale: f64, tolerance: f64) {
+        self.fill_from(0, field, z, scale, tolerance);
+    }
+
+    /// The same, but for the columns before `start`: they hold [`UNUSED`].
+    pub(crate) fn fill_from(
+        &mut self,
+        start: usize,
+        field: &MeridianField,
+        z: f64,
+        scale: f64,
+        tolerance: f64,
+    ) {
         let (columns, first) = field.columns();
         for c in &mut self.coefficients {
             c.clear();
             c.resize(columns + PADDING, 0.0);
         }
+        self.coefficients[0][..start].fill(UNUSED);
         self.leaves.clear();
         self.leaves.resize(columns, 0);
         self.height = z;
@@ -53,6 +68,10 @@ impl RadialTable {
         #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
         let node = |k: usize| (first + k as i64) as f64 * cell;
         field.leaves_at(z, &mut |from, to, number| {
+            let from = from.max(start);
+            if from >= to {
+                return;
+            }
             self.leaves[from..to].fill(number);
             let leaf = field.leaf(number);
             let features = field.features(leaf);
