@@ -48,6 +48,8 @@ const PADDING: usize = 2;
 /// Tolerances to which a distance is so small that the rounding of the first coefficient does not count: less than a
 /// fifth of a tolerance.
 const SMALL: f64 = 4_194_304.0;
+/// Value of the columns that are left out: further away than anything, and its square is in range.
+pub(crate) const UNUSED: f32 = 1e30;
 /// Features that may follow each other within one cell.
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
@@ -65,10 +67,24 @@ impl RadialTable {
         scale: f64,
         tolerance: f64,
     ) {
+        self.fill_from(0, kernel, field, z, scale, tolerance);
+    }
+
+    /// The same, but for the columns before `start`: they hold [`UNUSED`].
+    pub(crate) fn fill_from(
+        &mut self,
+        start: usize,
+        kernel: Kernel,
+        field: &MeridianField,
+        z: f64,
+        scale: f64,
+        tolerance: f64,
+    ) {
         let (columns, first) = field.columns();
         self.groups.clear();
         self.groups
             .resize(columns / GROUP + PADDING, [[0.0; GROUP]; 5]);
+        (0..start).for_each(|k| self.settle(k, UNUSED));
         self.leaves.clear();
         self.leaves.resize(columns, 0);
         self.ridges.clear();
@@ -81,6 +97,10 @@ impl RadialTable {
         #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
         let node = |k: usize| (first + k as i64) as f64 * cell;
         field.leaves_at(z, &mut |from, to, number| {
+            let from = from.max(start);
+            if from >= to {
+                return;
+            }
             self.leaves[from..to].fill(number);
             let leaf = field.leaf(number);
             let features = field.features(leaf);
@@ -100,7 +120,7 @@ impl RadialTable {
         });
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
         let small = (SMALL * tolerance * scale) as f32;
-        let large = |v: &f32| v.abs() > small;
+        let large = |v: &f32| v.abs() > small && *v != UNUSED;
         self.precise = self.groups.iter().any(|g| g[0].iter().any(large));
         if !self.precise {
             for group in &mut self.groups {
@@ -114,9 +134,14 @@ impl RadialTable {
         (&self.groups, self.precise)
     }
 
+    /// The value where a cell begins, not a number where it has no cubic.
+    pub(crate) fn at_start_of(&self, cell: usize) -> f32 {
+        self.groups[cell / GROUP][0][cell % GROUP]
+    }
+
     /// Whether a cell has no cubic.
     pub(crate) fn is_open(&self, cell: usize) -> bool {
-        self.groups[cell / GROUP][0][cell % GROUP].is_nan()
+        self.at_start_of(cell).is_nan()
     }
 
     /// Gives a cell one value all over.

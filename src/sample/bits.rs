@@ -144,6 +144,13 @@ mod tests {
                 flip(&mut words, 10, 20);
                 set(&mut words, 77, true);
                 set(&mut words, 78, false);
+                for at in 0..bits {
+                    let found = sixteen(&words, at);
+                    for n in 0..16 {
+                        let wanted = at + n < 64 * words.len() && get(&words, at + n);
+                        assert_eq!(found >> n & 1 != 0, wanted, "{n} from {at}");
+                    }
+                }
                 let mut bytes = vec![9; bits];
                 expand(kernel, &words, &mut bytes);
                 for (at, byte) in bytes.iter().enumerate() {

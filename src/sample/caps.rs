@@ -25,14 +25,21 @@ use crate::solid::Revolved;
 pub(super) const GROUP: usize = 16;
 /// Lengths above this have no square in range of f32.
 const FAR: f64 = 1e18;
-/// Share of the least spacing within which a point may be on either side of a cap's plane.
-const GUARD: f64 = 1e-6;
+/// Share of the least spacing within which a point may be on either side of a cap's plane: some tens of roundings of
+/// a place 65 000 cells away.
+const GUARD: f64 = 1e-9;
+/// Least sine of half a turn above 180 degrees. Near a full turn s is small beside the axis, too, where the guard
+/// must not hide that a voxel is in the wedge: it does so up to GUARD / sine from the axis, where S and E differ by
+/// twice that, a hundredth of what they may err by.
+const LEAST_SINE: f64 = 2e-3;
 
 /// Rows of a grid around the axis of a wedge.
 #[derive(Debug)]
 pub(super) struct CapPlane {
     /// The voxels of a row along x, from the axis; the last is repeated to fill the group.
     x: Vec<f64>,
+    /// The first and the last of each group of them.
+    ends: Vec<[f64; 2]>,
     y: Vec<f64>,
     /// For either cap, its direction.
     along: [[f64; 2]; 2],
@@ -59,8 +66,8 @@ pub(super) struct CapRow {
 }
 
 impl CapPlane {
-    /// The rows of `grid` in cells of `cell` scene units; `None` where the turn is full or the
-    /// numbers are too large.
+    /// The rows of `grid` in cells of `cell` scene units; `None` where the turn is full, or all
+    /// but full, or the numbers are too large.
     pub(super) fn new(body: &Revolved, grid: &GridSpec, cell: f64) -> Option<Self> {
         let wedge = body.turn().halves()?;
         let frame = body.frame();
@@ -83,10 +90,15 @@ impl CapPlane {
             .map(|d| [d[0] * e1.x + d[1] * e2.x, d[0] * e1.y + d[1] * e2.y]);
         let mixed = |a: f64, b: f64| [a * m[0] + b * n[0], a * m[1] + b * n[1]];
         let (sin, cos) = (wedge.sin, wedge.cos);
+        if cos < 0.0 && sin < LEAST_SINE {
+            return None;
+        }
         let sense = if cos >= 0.0 { 1.0 } else { -1.0 };
         #[allow(clippy::cast_precision_loss, reason = "a small count")]
         let span = (BLOCK - 1) as f64 * grid.spacing().x / cell;
+        let (groups, _) = x.as_chunks::<GROUP>();
         Some(Self {
+            ends: groups.iter().map(|g| [g[0], g[GROUP - 1]]).collect(),
             x,
             y,
             along: [mixed(cos, sin), mixed(cos, -sin)],
@@ -121,7 +133,7 @@ impl CapPlane {
     }
 
     /// The same with places counted from column `first` of a table.
-    pub(super) fn from_column(self, first: i64) -> Self {
+    pub(super) fn with_first_column(self, first: i64) -> Self {
         #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
         let axis_place = -(first as f64) * PLACES;
         Self { axis_place, ..self }
@@ -148,26 +160,45 @@ impl CapPlane {
         &self.x
     }
 
+    /// The first and the last voxel of each group of them.
+    pub(super) fn ends(&self) -> &[[f64; 2]] {
+        &self.ends
+    }
+
+    /// Whether, from outside the wedge, no place along the caps is below 0.
+    pub(super) fn sees_forwards(&self) -> bool {
+        self.sense < 0.0
+    }
+
     /// Whether one window of cells may not serve a block.
     pub(super) fn is_scattered(&self) -> bool {
         self.scattered
     }
 }
 
-/// The larger of either cap's.
+/// The larger of two numbers, as lanes have it.
 #[inline(always)]
-fn larger(of: [[f64; 2]; 2], x: f64) -> f64 {
-    let (a, b) = (x * of[0][0] + of[0][1], x * of[1][0] + of[1][1]);
+fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
+/// The lesser of two numbers, as lanes have it.
+#[inline(always)]
+fn min(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of either cap's.
+#[inline(always)]
+fn larger(of: [[f64; 2]; 2], x: f64) -> f64 {
+    max(x * of[0][0] + of[0][1], x * of[1][0] + of[1][1])
+}
+
 impl CapRow {
-    /// Place along the nearer cap, and s, of the voxel at `x`.
-    pub(super) fn at(&self, x: f64) -> [f64; 2] {
-        [
-            larger(self.along, x),
-            f64::from(self.sense) * larger(self.across, x),
-        ]
+    /// Place along the nearer cap of the voxel at `x`.
+    #[inline(always)]
+    pub(super) fn place(&self, x: f64) -> u32 {
+        rounded(larger(self.along, x))
     }
 }
 
@@ -202,13 +233,12 @@ impl pulp::NullaryFnOnce for Places<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let (x, _) = self.x.as_chunks::<BLOCK>();
-        let (places, _) = self.places.as_chunks_mut::<BLOCK>();
-        let along = self.row.along;
-        for ((x, places), cell) in x.iter().zip(places).zip(self.cells) {
-            for (place, x) in places.iter_mut().zip(x) {
-                *place = rounded(larger(along, *x));
-            }
+        // One loop for each thing, which the compiler gives to lanes.
+        for (place, x) in self.places.iter_mut().zip(self.x) {
+            *place = self.row.place(*x);
+        }
+        let (places, _) = self.places.as_chunks::<BLOCK>();
+        for (places, cell) in places.iter().zip(self.cells) {
             let least = places.iter().fold(u32::MAX, |m, p| m.min(*p));
             *cell = if self.scattered {
                 SCATTERED
@@ -247,6 +277,10 @@ fn signed(value: f32, inside: u32, least: f32, band: f32) -> (f32, u32) {
 /// full turn is at the point's own angle.
 pub(super) struct SweptGroups<'a> {
     pub(super) given: Given<'a>,
+    /// The first and the last voxel of each group along x.
+    pub(super) ends: &'a [[f64; 2]],
+    /// Left as the least |s| of each group, below 0 where some voxel may not be in the wedge.
+    pub(super) gaps: &'a mut [f32],
     /// Set for each group that a cap may be nearest to.
     pub(super) wanted: &'a mut [bool],
     pub(super) out: &'a mut [f32],
@@ -260,35 +294,36 @@ impl pulp::NullaryFnOnce for SweptGroups<'_> {
     fn call(self) {
         let Given {
             row,
-            x,
             inside,
             swept,
             least,
             band,
+            ..
         } = self.given;
-        let (x, _) = x.as_chunks::<GROUP>();
         let (swept, _) = swept.as_chunks::<GROUP>();
         let (out, _) = self.out.as_chunks_mut::<GROUP>();
         let groups = inside.len();
-        for g in 0..groups {
-            // The least |s| of the group, below 0 where some voxel may not be in the wedge.
-            let ends = [x[g][0], x[g][GROUP - 1]];
-            let [p, q] = row.across.map(|c| ends.map(|x| x * c[0] + c[1]));
-            let most = if row.sense > 0.0 {
-                p[0].max(p[1]).max(q[0].max(q[1]))
-            } else {
-                -(p[0].min(p[1]).max(q[0].min(q[1])))
-            };
+        let (ends, gaps) = (&self.ends[..groups], &mut self.gaps[..groups]);
+        for (gap, [a, b]) in gaps.iter_mut().zip(ends) {
+            let [c, d] = row.across;
+            let (p, q) = (a * c[0] + c[1], b * c[0] + c[1]);
+            let (r, s) = (a * d[0] + d[1], b * d[0] + d[1]);
+            let (low, high) = (max(min(p, q), min(r, s)), max(max(p, q), max(r, s)));
+            let most = if row.sense > 0.0 { high } else { -low };
             #[allow(clippy::cast_possible_truncation, reason = "a hair more is taken off")]
-            let gap = (-most * (1.0 - 1e-6)) as f32;
+            {
+                *gap = (-most * (1.0 - 1e-6)) as f32;
+            }
+        }
+        for g in 0..groups {
+            let gap = gaps[g];
             let bits = u32::from(inside[g]);
             let swept = &swept[g];
             let wanted = gap < row.guard
                 || bits != 0 && {
-                    let deepest = swept.iter().fold(0.0_f32, |m, s| {
-                        let s = s.abs();
-                        if s > m { s } else { m }
-                    });
+                    // As whole numbers, whose largest the lanes may find in any order.
+                    let bits = swept.iter().fold(0, |m, s| s.abs().to_bits().max(m));
+                    let deepest = f32::from_bits(bits);
                     gap < deepest
                 };
             self.wanted[g] = wanted;
@@ -310,8 +345,8 @@ impl pulp::NullaryFnOnce for SweptGroups<'_> {
 /// Fills groups where caps may be the nearest.
 pub(super) struct CapGroups<'a> {
     pub(super) given: Given<'a>,
-    /// Signed distances to the section in the cap's plane.
-    pub(super) edges: &'a [f32],
+    /// Signed distances to the section in the cap's plane; left as those to the cap.
+    pub(super) edges: &'a mut [f32],
     pub(super) out: &'a mut [f32],
     pub(super) doubts: &'a mut [bool],
 }
@@ -329,19 +364,22 @@ impl pulp::NullaryFnOnce for CapGroups<'_> {
             least,
             band,
         } = self.given;
-        let (x, _) = x.as_chunks::<GROUP>();
+        // In loops over the whole run, or of whole groups: shorter ones are unrolled before they get their lanes.
+        let lanes = x.iter().zip(self.edges.iter_mut()).zip(self.out.iter_mut());
+        for ((x, edge), out) in lanes {
+            [*out, *edge] = cap(row, *x, *edge);
+        }
         let (swept, _) = swept.as_chunks::<GROUP>();
-        let (edges, _) = self.edges.as_chunks::<GROUP>();
+        let (caps, _) = self.edges.as_chunks::<GROUP>();
         let (out, _) = self.out.as_chunks_mut::<GROUP>();
-        let groups = x.iter().zip(swept).zip(edges).zip(out);
+        let groups = swept.iter().zip(caps).zip(out);
         let marks = inside.iter().zip(self.doubts);
-        for ((((x, swept), edges), out), (bits, mark)) in groups.zip(marks) {
+        for (((swept, caps), out), (bits, mark)) in groups.zip(marks) {
             let bits = u32::from(*bits);
             let mut doubts = 0;
             for n in 0..GROUP {
-                let inside = (bits >> n) & 1;
-                let value = combined(row, x[n], swept[n], edges[n], inside != 0);
-                let (value, doubt) = signed(value, inside, least, band);
+                let value = nearer(row, swept[n], [out[n], caps[n]]);
+                let (value, doubt) = signed(value, (bits >> n) & 1, least, band);
                 out[n] = value;
                 doubts |= doubt;
             }
@@ -350,23 +388,32 @@ impl pulp::NullaryFnOnce for CapGroups<'_> {
     }
 }
 
-/// Unsigned distance of one voxel; NaN where it rests on an edge distance that is.
+/// s, but for its sense, and the distance to the cap: NaN where the edge's is.
 #[inline(always)]
 #[allow(
     clippy::cast_possible_truncation,
     reason = "the one rounding of the stored value"
 )]
-pub(super) fn combined(row: CapRow, x: f64, swept: f32, edge: f32, inside: bool) -> f32 {
+fn cap(row: CapRow, x: f64, edge: f32) -> [f32; 2] {
     let across = larger(row.across, x);
     let edge = f64::from(if edge < 0.0 { 0.0 } else { edge });
-    let cap = (across * across + edge * edge).sqrt() as f32;
-    let across = across as f32;
-    let swept = swept.abs();
+    [across as f32, (across * across + edge * edge).sqrt() as f32]
+}
+
+/// The lesser of the distances to the swept surface and to the cap, in the wedge, and that to the cap outside it.
+///
+/// From outside the solid in the wedge the cap is no nearer than the swept surface: the lesser is the latter, or
+/// equal to it but for the errors of both.
+#[inline(always)]
+fn nearer(row: CapRow, swept: f32, [across, cap]: [f32; 2]) -> f32 {
     let turned = row.sense * across < -row.guard;
-    let nearer = across.abs() >= swept || cap >= swept;
-    if if inside { nearer } else { turned } {
-        swept
-    } else {
-        cap
-    }
+    let swept = if turned { swept.abs() } else { f32::INFINITY };
+    // The second comparison alone would do, were it not for caps that are NaN and do not matter.
+    let cap = if cap >= swept { swept } else { cap };
+    if across.abs() >= swept { swept } else { cap }
+}
+
+/// Unsigned distance of one voxel; NaN where it rests on an edge distance that is.
+pub(super) fn combined(row: CapRow, x: f64, swept: f32, edge: f32) -> f32 {
+    nearer(row, swept, cap(row, x, edge))
 }

@@ -7,8 +7,7 @@
 //! ```text
 //!   cap   = hypot(s, max(E(a), 0))       in the section E < 0 and the cap's face is nearest
 //!   |sdf| = cap                          outside the wedge
-//!           S                            outside the solid in the wedge: no point of the whole turn is nearer
-//!           min(S, cap)                  inside
+//!           min(S, cap)                  in it; S alone outside the solid, as no point of the whole turn is nearer
 //! ```
 //!
 //! The sign is the membership's bit. Groups of voxels that no cap can be nearest to take S alone; S is the same for
@@ -84,6 +83,7 @@ pub(super) struct PartialScratch {
 #[derive(Debug, Default)]
 struct RowScratch {
     inside: Vec<u16>,
+    gaps: Vec<f32>,
     wanted: Vec<bool>,
     doubts: Vec<bool>,
     places: Vec<u32>,
@@ -137,7 +137,7 @@ impl PartialSampler {
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
         let near = (NEAR * spacing.min_element()) as f32;
         Some(Self {
-            caps: caps.from_column(edges.columns().1),
+            caps: caps.with_first_column(edges.columns().1),
             swept,
             edges,
             plane,
@@ -166,12 +166,9 @@ impl PartialSampler {
         let height = frame.to_local_exact(grid.centre(0, 0, known.k))[2].f64();
         let (scale, tolerance) = (frame.scale(), self.tolerance);
         let kernel = writing.kernel;
-        scratch
-            .swept
-            .fill(kernel, &self.swept, height, scale, tolerance);
-        scratch
-            .edges
-            .fill(kernel, &self.edges, height, scale, tolerance);
+        (scratch.swept).fill(kernel, &self.swept, height, scale, tolerance);
+        let start = self.first_used(&scratch.swept, scale);
+        (scratch.edges).fill_from(start, kernel, &self.edges, height, scale, tolerance);
         self.settle(body, height, &mut scratch.edges, &mut scratch.crossed);
         let PartialScratch {
             swept,
@@ -215,6 +212,41 @@ impl PartialSampler {
             if writing.past_caches && (queue.is_full() || n + 1 == rows) {
                 queue.write(writing.kernel, out);
             }
+        }
+    }
+
+    /// The first column of E that a layer with this table of S uses.
+    ///
+    /// From outside a wedge of more than half a turn, a is above 0. In the solid a cap is no nearer than -a, which is
+    /// its least distance from the axis, and so nearer than the swept surface only where S is more than that.
+    fn first_used(&self, swept: &RadialTable, scale: f64) -> usize {
+        if !self.caps.sees_forwards() {
+            return 0;
+        }
+        let cell = self.swept.cell() * scale;
+        let columns = self.swept.columns().0;
+        // S changes by a cell at most from one column to the next, and by one in it.
+        let (mut deepest, mut last) = (0.0_f64, f64::INFINITY);
+        for column in 0..columns {
+            let value = f64::from(swept.at_start_of(column));
+            last = if value.is_nan() {
+                last + cell
+            } else {
+                (-value).max(0.0)
+            };
+            deepest = deepest.max(last);
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_precision_loss,
+            clippy::cast_sign_loss,
+            reason = "whole cells; infinity saturates"
+        )]
+        {
+            let (columns, first) = self.edges.columns();
+            let start = -(first as f64) - (deepest / cell + 3.0);
+            // The whole grid may be behind the caps.
+            (start.floor().max(0.0) as usize).min(columns)
         }
     }
 
@@ -314,6 +346,8 @@ impl PartialSampler {
             kernel,
             SweptGroups {
                 given,
+                ends: self.caps.ends(),
+                gaps: &mut scratch.gaps,
                 wanted: &mut scratch.wanted,
                 out,
                 doubts: &mut scratch.doubts,
@@ -414,7 +448,7 @@ impl PartialSampler {
         let inside = bits::get(known.inside, j * grid.dims()[0] + i);
         let value = if found.is_nan() {
             let x = self.caps.x()[i];
-            combined(row, x, swept, self.edge(layer, row, x), inside)
+            combined(row, x, swept, self.edge(layer, row, x))
         } else {
             0.0
         };
@@ -430,18 +464,11 @@ impl PartialSampler {
 
     /// Distance to the section in the cap's plane, 0 in it, at a place where the table has none.
     fn edge(&self, layer: &Layer<'_>, row: CapRow, x: f64) -> f32 {
-        let [place, _] = row.at(x);
-        let (columns, first) = self.edges.columns();
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "a column of the table"
-        )]
-        let (column, along) = (
-            ((place / PLACES) as usize).min(columns - 1),
-            (place / PLACES + first as f64) * self.edges.cell(),
-        );
+        // The column as the lanes saw it.
+        let place = row.place(x);
+        let column = (place >> 16) as usize;
+        #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+        let along = (f64::from(place) / PLACES + self.edges.columns().1 as f64) * self.edges.cell();
         if layer.crossed[column] && layer.body.section_holds([along, layer.height]) {
             return 0.0;
         }
@@ -463,6 +490,7 @@ impl RowScratch {
     fn resize(&mut self, padded: usize) {
         let groups = padded / GROUP;
         self.inside.resize(groups, 0);
+        self.gaps.resize(groups, 0.0);
         self.wanted.resize(groups, false);
         self.doubts.resize(groups, false);
         self.places.resize(padded, 0);

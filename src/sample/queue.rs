@@ -74,3 +74,34 @@ impl RowQueue {
         self.waiting = [0; 2];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_arrive_where_they_belong() {
+        const WIDTH: usize = 1500;
+        let row = |j: usize| vec![f32::from(u16::try_from(j).expect("few rows")); WIDTH];
+        let mut queue = RowQueue::default();
+        for rows in [1, 2, 10, 11, 40, 41] {
+            for mirrored in [false, true] {
+                let mut layer = vec![-1.0; rows * WIDTH];
+                queue.start(WIDTH);
+                let first_half = if mirrored { rows.div_ceil(2) } else { rows };
+                for j in 0..first_half {
+                    queue.push_ahead(&row(j));
+                    if mirrored && 2 * j + 1 < rows {
+                        queue.push_behind(&row(rows - 1 - j));
+                    }
+                    if queue.is_full() || j + 1 == first_half {
+                        queue.write(Kernel::default(), &mut layer);
+                    }
+                }
+                for (j, found) in layer.chunks(WIDTH).enumerate() {
+                    assert_eq!(found, row(j), "row {j} of {rows}, {mirrored}");
+                }
+            }
+        }
+    }
+}
