@@ -253,7 +253,10 @@ fn every_way_gives_the_same_bytes() {
         SimdLevel::Auto,
     ];
     let upright = (SCENES.iter()).map(|(name, text)| (name.to_string(), text.to_string()));
-    for (name, text) in upright.chain(about(DIRECTIONS[0])).chain(about(DIRECTIONS[1])) {
+    for (name, text) in upright
+        .chain(about(DIRECTIONS[0]))
+        .chain(about(DIRECTIONS[1]))
+    {
         let scene = scene(&text);
         for grid in grids(&scene) {
             let n = usize::try_from(grid.voxel_count()).expect("small");

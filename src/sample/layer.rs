@@ -375,7 +375,7 @@ impl<'a> LayerSampler<'a> {
         if let (Some((body, _)), Some(radial)) = (self.upright_body(), &self.radial) {
             radial.layer(body, self.grid, known, writing, own, out);
         } else if let Some((body, tilted)) = self.tilted_body() {
-            tilted.layer(body, self.grid, known, writing, turned, out);
+            tilted.layer(body, self.grid, k, writing, turned, out);
         } else {
             return false;
         }
@@ -440,7 +440,8 @@ impl<'a> LayerSampler<'a> {
 
     /// Fills one layer of distances in a large buffer.
     pub(super) fn distance_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [f32]) {
-        if self.layer_bits(k, scratch) {
+        // About a tilted axis the distances tell the sides.
+        if self.tilted.is_some() || self.layer_bits(k, scratch) {
             self.radial_layer(k, scratch, out, true);
         }
     }
