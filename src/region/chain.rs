@@ -60,6 +60,17 @@ pub(crate) struct Chain {
     tolerance: f64,
 }
 
+/// Where one feature hands over to the next.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Joint {
+    pub(crate) next: u32,
+    /// The unit tangent there, and the place: the next feature answers for points beyond the normal.
+    pub(crate) along: [f64; 2],
+    pub(crate) at: [f64; 2],
+    /// What the two differ by over the box at most.
+    difference: f64,
+}
+
 /// A signed distance with its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Local {
@@ -293,35 +304,62 @@ impl Chain {
     /// A bound on what [`local`](Self::local) of a feature, nearest to some point of a box, differs by from the signed
     /// distance to its run, over the box (its corners are given). The run is smooth in it.
     pub(crate) fn departure(&self, feature: u32, corners: &[[f64; 2]; 4]) -> f64 {
-        let way = |ahead: bool| {
-            let mut sum = 0.0;
-            let mut at = feature;
-            for _ in 0..MOST_JOINTS {
-                let f = &self.features[at as usize];
-                let (next, along, joint) = if ahead {
-                    (f.after, f.arc.to, f.arc.end)
-                } else {
-                    (f.before, f.arc.from.map(|c| -c), f.arc.start)
-                };
-                // A joint that no point is beyond is the last: who is beyond the next is beyond this one.
-                let beyond = |p: &[f64; 2]| dot(along, minus(*p, joint));
-                let furthest = corners.iter().map(beyond).fold(0.0, f64::max);
-                if next >= AXIS || furthest <= 0.0 {
-                    return sum;
-                }
-                let normal = if ahead {
-                    [-along[1], along[0]]
-                } else {
-                    [along[1], -along[0]]
-                };
-                let heights = corners.map(|p| dot(normal, minus(p, joint)));
-                let jump = self.jump([at, next], heights);
-                sum += furthest * (0.5 * furthest * jump + SMOOTH);
-                at = next;
-            }
-            f64::INFINITY
+        self.departure_one_way(feature, true, corners)
+            + self.departure_one_way(feature, false, corners)
+    }
+
+    fn departure_one_way(&self, feature: u32, ahead: bool, corners: &[[f64; 2]; 4]) -> f64 {
+        let mut sum = 0.0;
+        let mut at = feature;
+        for _ in 0..MOST_JOINTS {
+            // A joint that no point is beyond is the last: who is beyond the next is beyond this one.
+            let Some(joint) = self.joint(at, ahead, corners) else {
+                return sum;
+            };
+            sum += joint.difference;
+            at = joint.next;
+        }
+        f64::INFINITY
+    }
+
+    /// The feature after or before one, nearest to some point of a box, where it answers for some of its points.
+    fn joint(&self, feature: u32, ahead: bool, corners: &[[f64; 2]; 4]) -> Option<Joint> {
+        let f = &self.features[feature as usize];
+        let (next, along, at) = if ahead {
+            (f.after, f.arc.to, f.arc.end)
+        } else {
+            (f.before, f.arc.from.map(|c| -c), f.arc.start)
         };
-        way(true) + way(false)
+        let beyond = |p: &[f64; 2]| dot(along, minus(*p, at));
+        let furthest = corners.iter().map(beyond).fold(0.0, f64::max);
+        if next >= AXIS || furthest <= 0.0 {
+            return None;
+        }
+        let normal = if ahead {
+            [-along[1], along[0]]
+        } else {
+            [along[1], -along[0]]
+        };
+        let heights = corners.map(|p| dot(normal, minus(p, at)));
+        let jump = self.jump([feature, next], heights);
+        Some(Joint {
+            next,
+            along,
+            at,
+            difference: furthest * (0.5 * furthest * jump + SMOOTH),
+        })
+    }
+
+    /// The joint within a box at which a feature, nearest to some point of it, hands over to one that differs most, with
+    /// what the two of them differ by from the signed distance to their run, each on its side.
+    pub(crate) fn split(&self, feature: u32, corners: &[[f64; 2]; 4]) -> Option<(Joint, f64)> {
+        let [back, ahead] = [false, true].map(|a| self.joint(feature, a, corners));
+        let difference = |j: &Option<Joint>| j.as_ref().map_or(0.0, |j| j.difference);
+        let is_ahead = difference(&ahead) > difference(&back);
+        let joint = if is_ahead { ahead } else { back }?;
+        let rest = self.departure_one_way(feature, !is_ahead, corners)
+            + self.departure_one_way(joint.next, is_ahead, corners);
+        Some((joint, rest))
     }
 
     /// The largest difference of the bends of two features that meet, at some heights along their normal.

@@ -38,7 +38,7 @@ pub use error::RegionError;
 pub use profile::{Boundary, Fill, ProfileLoop, Region};
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
-pub(crate) use cells::{CellTable, LEVEL_BITS, LOST_BITS, TILE};
+pub(crate) use cells::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};
 pub(crate) use chain::Chain;
 pub(crate) use crossings::MeridianPoint;
 pub(crate) use curve::{HomogeneousPoint, beziers};

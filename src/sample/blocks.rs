@@ -5,22 +5,22 @@
 //! than the distance's own error are asked one by one.
 
 use super::bits;
-use super::lookup::{CHUNK, LANES, Lanes, LayerView, Points, look_up, look_up_ridge};
+use super::lookup::{CHUNK, LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
 use crate::math::Kernel;
 use crate::region::CellTable;
 
-/// Voxels along the sides of squares, and of their parts. Measured on goblets and cones: more steps cost lists, fewer
-/// cost points.
-const SIDES: [u32; 5] = [32, 8, 4, 2, 1];
+/// Voxels along the sides of squares, and of their parts. The voxels of the last are one block of lanes.
+const SIDES: [u32; 3] = [32, 8, LAST];
+const LAST: u32 = 4;
 
 /// What one thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct BlockScratch {
     /// First voxels of the squares that are left, and of their parts.
     squares: [Vec<[u32; 2]>; 2],
-    centres: [Vec<f64>; 2],
+    points: [Vec<f64>; 2],
     values: Vec<f32>,
-    doubts: Vec<u16>,
+    marks: Vec<Marks>,
 }
 
 /// A layer of voxels with its distances.
@@ -48,9 +48,9 @@ impl BlockLayer<'_> {
         let [nx, ny] = self.size.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         let BlockScratch {
             squares: [squares, parts],
-            centres: [ci, cj],
+            points,
             values,
-            doubts,
+            marks,
         } = scratch;
         squares.clear();
         let first = SIDES[0] as usize;
@@ -58,63 +58,108 @@ impl BlockLayer<'_> {
             squares.extend((0..nx).step_by(first).map(|i| [i, j]));
         }
         values.resize(CHUNK, 0.0);
-        doubts.resize(CHUNK / LANES, 0);
+        marks.resize(CHUNK / LANES, Marks::default());
         let diagonal = self.spacing[0].hypot(self.spacing[1]);
         for (n, &side) in SIDES.iter().enumerate() {
             let half = 0.5 * f64::from(side - 1) * diagonal;
             #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
             let limit = (half * (1.0 + 1e-6) + self.near) as f32;
+            let part = SIDES.get(n + 1).copied().unwrap_or(side);
             parts.clear();
             for chunk in squares.chunks(CHUNK) {
                 // The centre of the part that is in the layer: its corners are no further.
                 let centre =
                     |at: u32, count: u32| f64::from(at) + 0.5 * f64::from(side.min(count - at) - 1);
-                ci.clear();
-                cj.clear();
-                ci.extend(chunk.iter().map(|s| centre(s[0], nx)));
-                cj.extend(chunk.iter().map(|s| centre(s[1], ny)));
-                let filled = chunk.len().next_multiple_of(LANES);
-                ci.resize(filled, ci[0]);
-                cj.resize(filled, cj[0]);
-                look_up(
-                    kernel,
-                    self.table,
-                    self.view,
-                    Points::Any(ci, cj),
-                    limit,
-                    lanes,
-                    (&mut values[..filled], &mut doubts[..filled / LANES]),
-                );
-                for (&[i, j], value) in chunk.iter().zip(values.iter()) {
-                    if value.abs() >= limit {
-                        if *value < 0.0 {
-                            let (to_i, to_j) = (nx.min(i + side), ny.min(j + side));
-                            for row in j as usize..to_j as usize {
-                                let first = row * self.size[0];
-                                bits::flip(words, first + i as usize, first + to_i as usize);
-                            }
+                for (c, (points, count)) in points.iter_mut().zip([nx, ny]).enumerate() {
+                    points.clear();
+                    points.extend(chunk.iter().map(|s| centre(s[c], count)));
+                    points.resize(chunk.len().next_multiple_of(LANES), points[0]);
+                }
+                let filled = self.look_up(kernel, limit, lanes, points, values, marks);
+                for (&[i, j], value) in chunk.iter().zip(&values[..filled]) {
+                    let (to_i, to_j) = (nx.min(i + side), ny.min(j + side));
+                    if !(value.abs() >= limit) {
+                        for j in (j..to_j).step_by(part as usize) {
+                            parts.extend((i..to_i).step_by(part as usize).map(|i| [i, j]));
                         }
-                        continue;
-                    }
-                    let Some(&part) = SIDES.get(n + 1) else {
-                        let at = [f64::from(i), f64::from(j)];
-                        let inside = look_up_ridge(self.table, self.view, at)
-                            .filter(|d| d.abs() >= limit)
-                            .map_or_else(|| ask(i as usize, j as usize), |d| d < 0.0);
-                        if inside {
-                            let at = j as usize * self.size[0] + i as usize;
-                            bits::flip(words, at, at + 1);
-                        }
-                        continue;
-                    };
-                    for j in (j..ny.min(j + side)).step_by(part as usize) {
-                        for i in (i..nx.min(i + side)).step_by(part as usize) {
-                            parts.push([i, j]);
+                    } else if *value < 0.0 {
+                        for row in j as usize..to_j as usize {
+                            let first = row * self.size[0];
+                            bits::flip(words, first + i as usize, first + to_i as usize);
                         }
                     }
                 }
             }
             std::mem::swap(squares, parts);
         }
+        #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
+        let near = self.near as f32;
+        for chunk in squares.chunks(CHUNK / LANES) {
+            let [ci, cj] = points;
+            ci.clear();
+            cj.clear();
+            for &[i, j] in chunk {
+                // Those beyond the layer take the place of its last.
+                for n in 0..LAST {
+                    let row = f64::from((j + n).min(ny - 1));
+                    cj.extend([row; LAST as usize]);
+                    ci.extend([0, 1, 2, 3].map(|n: u32| f64::from((i + n).min(nx - 1))));
+                }
+            }
+            self.look_up(kernel, near, lanes, points, values, marks);
+            for (&[i, j], marks) in chunk.iter().zip(&*marks) {
+                let mut inside = marks.negative & !marks.doubtful;
+                let mut doubtful = marks.doubtful;
+                while doubtful != 0 {
+                    let n = doubtful.trailing_zeros();
+                    doubtful &= doubtful - 1;
+                    let (i, j) = (i + n % LAST, j + n / LAST);
+                    if i < nx && j < ny {
+                        let at = [f64::from(i), f64::from(j)];
+                        let known = look_up_ridge(self.table, self.view, at);
+                        let holds = known
+                            .filter(|d| d.abs() >= near)
+                            .map_or_else(|| ask(i as usize, j as usize), |d| d < 0.0);
+                        inside |= u16::from(holds) << n;
+                    }
+                }
+                let columns = (1_u64 << LAST.min(nx - i)) - 1;
+                for row in j..ny.min(j + LAST) {
+                    let four = u64::from(inside >> ((row - j) * LAST)) & columns;
+                    let at = row as usize * self.size[0] + i as usize;
+                    words[at / 64] ^= four << (at % 64);
+                    if at % 64 > 64 - LAST as usize {
+                        // The last bits of a layer may have no word to go on in; then there are none.
+                        let rest = four >> (64 - at % 64);
+                        if rest != 0 {
+                            words[at / 64 + 1] ^= rest;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Looks up the distances of points, as many as there are.
+    fn look_up(
+        &self,
+        kernel: Kernel,
+        limit: f32,
+        lanes: &mut Lanes,
+        [i, j]: &[Vec<f64>; 2],
+        values: &mut [f32],
+        marks: &mut [Marks],
+    ) -> usize {
+        let count = i.len();
+        look_up(
+            kernel,
+            self.table,
+            self.view,
+            Points::Any(i, j),
+            limit,
+            lanes,
+            (&mut values[..count], &mut marks[..count / LANES]),
+        );
+        count
     }
 }

@@ -389,7 +389,7 @@ impl<'a> LayerSampler<'a> {
         } = scratch;
         let known = KnownLayer { k, inside };
         if let Some((body, tilted)) = self.tilted_body() {
-            tilted.layer(body, self.grid, known, writing, turned, out);
+            tilted.layer(body, self.grid, k, writing, turned, out);
             return true;
         }
         let Some((body, _)) = self.upright_body() else {
@@ -465,7 +465,8 @@ impl<'a> LayerSampler<'a> {
 
     /// Fills one layer of distances in a large buffer.
     pub(super) fn distance_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [f32]) {
-        if self.layer_bits(k, scratch) {
+        // About a tilted axis the distances tell the sides.
+        if self.tilted.is_some() || self.layer_bits(k, scratch) {
             self.radial_layer(k, scratch, out, true);
         }
     }

@@ -13,7 +13,7 @@
 //! The plain loops are the definition; compiled for wider lanes they do the same operations in the same order.
 
 use crate::math::Kernel;
-use crate::region::{CellTable, LEVEL_BITS, LOST_BITS, TILE};
+use crate::region::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};
 #[cfg(target_arch = "x86_64")]
 use pulp::Arch;
 
@@ -69,8 +69,17 @@ impl Default for Lanes {
     }
 }
 
-/// Fills `out` with the signed distances of points of a layer, NaN where the table has none, and sets in `doubts` a bit
-/// for each that is NaN or nearer to 0 than `least`. Both have room for whole blocks, which may be filled.
+/// What is known of a block's values, a bit for each.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Marks {
+    /// NaN, or nearer to 0 than the limit.
+    pub(super) doubtful: u16,
+    /// Below 0.
+    pub(super) negative: u16,
+}
+
+/// Fills `out` with the signed distances of points of a layer, NaN where the table has none, and `marks` with what is
+/// known of them where they are not nearer to 0 than `least`. Both have room for whole blocks, which may be filled.
 pub(super) fn look_up(
     kernel: Kernel,
     table: &CellTable,
@@ -78,7 +87,7 @@ pub(super) fn look_up(
     points: Points<'_>,
     least: f32,
     lanes: &mut Lanes,
-    (out, doubts): (&mut [f32], &mut [u16]),
+    (out, marks): (&mut [f32], &mut [Marks]),
 ) {
     let job = LookUp {
         table,
@@ -87,7 +96,7 @@ pub(super) fn look_up(
         least,
         lanes,
         out,
-        doubts,
+        marks,
     };
     match kernel.lanes() {
         None => job.run(&Plain),
@@ -97,8 +106,8 @@ pub(super) fn look_up(
     }
 }
 
-/// The signed distance at one point of a layer where a ridge is near, from the nearest of its cell's circles; `None`
-/// where it has none.
+/// The signed distance at one point of a layer whose cell has several circles, from the nearest of them; `None` where it
+/// has none.
 pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]) -> Option<f32> {
     let (mut r, mut z, mut tile, mut cell) = ([0], [0], [0], [0]);
     let (mut ar, mut az) = ([0.0], [0.0]);
@@ -107,14 +116,19 @@ pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]
     tile_numbers(&scale, [&r, &z], &mut tile);
     tile[0] = table.tiles().0[tile[0] as usize];
     cell_numbers(&scale, [&r, &z], &tile, &mut cell, [&mut ar, &mut az]);
-    let circles = table.ridge(&table.cells()[cell[0] as usize]);
-    let first = circles.first()?;
-    // As many lanes as there are circles; the others have the first.
-    let mut four = first.map(|number| [number; LANES]);
-    for (n, circle) in circles.iter().enumerate() {
-        for (numbers, number) in four.iter_mut().zip(circle) {
-            numbers[n] = *number;
+    let runs = table.ridge(&table.cells()[cell[0] as usize]);
+    // As many lanes as there are runs; the others have the first.
+    let mut four = runs.first()?.map(|number| [number; LANES]);
+    for (n, run) in runs.chunks_exact(PARTS).enumerate() {
+        let [along_r, along_z, off] = [0, 1, 2].map(|n| f32::from_bits(run[2][n]));
+        let beyond = along_r * ar[0] + along_z * az[0] + off > 0.0;
+        for (numbers, number) in four.iter_mut().zip(run[usize::from(beyond)]) {
+            numbers[n] = number;
         }
+    }
+    for numbers in &mut four {
+        let first = numbers[0];
+        numbers[runs.len() / PARTS..].fill(first);
     }
     let values = distances(&four, [&[ar[0]; LANES], &[az[0]; LANES]], &scale.factors);
     let nearer = |a: f32, b: f32| if b.abs() < a.abs() { b } else { a };
@@ -166,7 +180,7 @@ struct LookUp<'a> {
     least: f32,
     lanes: &'a mut Lanes,
     out: &'a mut [f32],
-    doubts: &'a mut [u16],
+    marks: &'a mut [Marks],
 }
 
 /// The compiler's own lanes.
@@ -189,8 +203,8 @@ trait Block {
     /// The cells of a block.
     fn collect(&self, cells: &[[u32; 4]], numbers: &[u32; LANES]) -> Four;
 
-    /// A bit for each value that is NaN or nearer to 0 than `least`.
-    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16;
+    /// What is known of a block's values.
+    fn marks(&self, values: &[f32; LANES], least: f32) -> Marks;
 }
 
 /// One by one.
@@ -211,12 +225,13 @@ impl Block for Plain {
     }
 
     #[inline(always)]
-    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16 {
-        let mut mask = 0;
+    fn marks(&self, values: &[f32; LANES], least: f32) -> Marks {
+        let mut marks = Marks::default();
         for n in 0..LANES {
-            mask |= u16::from(!(values[n].abs() >= least)) << n;
+            marks.doubtful |= u16::from(!(values[n].abs() >= least)) << n;
+            marks.negative |= u16::from(values[n] < 0.0) << n;
         }
-        mask
+        marks
     }
 }
 
@@ -230,7 +245,7 @@ impl LookUp<'_> {
             least,
             lanes,
             out,
-            doubts,
+            marks,
         } = self;
         let scale = Scale::new(table);
         let (tiles, _) = table.tiles();
@@ -242,8 +257,8 @@ impl LookUp<'_> {
             cell,
             away: [ar, az],
         } = lanes;
-        let outs = out.chunks_mut(CHUNK).zip(doubts.chunks_mut(CHUNK / LANES));
-        for (chunk, (out, doubts)) in outs.enumerate() {
+        let outs = out.chunks_mut(CHUNK).zip(marks.chunks_mut(CHUNK / LANES));
+        for (chunk, (out, marks)) in outs.enumerate() {
             let count = out.len();
             let (r, z) = (&mut r[..count], &mut z[..count]);
             let (tile, cell) = (&mut tile[..count], &mut cell[..count]);
@@ -257,21 +272,23 @@ impl LookUp<'_> {
                 }
             }
             tile_numbers(&scale, [r, z], tile);
-            for tile in &mut *tile {
-                *tile = tiles[*tile as usize];
+            for block in tile.as_chunks_mut::<LANES>().0 {
+                for tile in block {
+                    *tile = tiles[*tile as usize];
+                }
             }
             cell_numbers(&scale, [r, z], tile, cell, [&mut *ar, &mut *az]);
-            let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(doubts);
+            let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(marks);
             let numbers = cell.as_chunks::<LANES>().0.iter();
             let away = ar
                 .as_chunks::<LANES>()
                 .0
                 .iter()
                 .zip(az.as_chunks::<LANES>().0);
-            for (((out, doubts), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
+            for (((out, marks), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
                 let four = block.collect(cells, numbers);
                 let values = distances(&four, [ar, az], &scale.factors);
-                *doubts = block.doubts(&values, least);
+                *marks = block.marks(&values, least);
                 *out = values;
             }
         }
@@ -434,9 +451,14 @@ impl Block for Transpose {
     }
 
     #[inline(always)]
-    fn doubts(&self, values: &[f32; LANES], least: f32) -> u16 {
+    fn marks(&self, values: &[f32; LANES], least: f32) -> Marks {
         let f = self.0.avx512f;
-        let size = f._mm512_abs_ps(pulp::cast(*values));
-        f._mm512_cmp_ps_mask::<9>(size, f._mm512_set1_ps(least))
+        let values = pulp::cast(*values);
+        let size = f._mm512_abs_ps(values);
+        Marks {
+            // Not at least; less.
+            doubtful: f._mm512_cmp_ps_mask::<9>(size, f._mm512_set1_ps(least)),
+            negative: f._mm512_cmp_ps_mask::<1>(values, f._mm512_setzero_ps()),
+        }
     }
 }

@@ -17,12 +17,11 @@
 //!   is of a number below 3 steps, 2e-7 of them; what the distance lost at the centre is kept to 5e-8. That stays below
 //!   what is said as long as a step is the least spacing; where it is more, by the tolerance of the cells.
 
-use super::bits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
-use super::lookup::{LANES, Lanes, LayerView, Points, look_up, look_up_ridge};
+use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
 use super::memory::copy_past_caches;
-use super::radial::{KnownLayer, Writing};
+use super::radial::Writing;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Real};
 use crate::region::{CellTable, Chain, Extent, MeridianField};
@@ -67,11 +66,18 @@ pub(super) struct TiltedSampler {
 pub(super) struct TiltedScratch {
     lanes: Lanes,
     blocks: BlockScratch,
-    doubts: Vec<u16>,
+    marks: Vec<Marks>,
     /// Rows that wait to be written together.
     rows: Vec<f32>,
-    /// Voxels of the layer whose distance the exact path tells.
-    close: Vec<[usize; 2]>,
+    close: Vec<Close>,
+}
+
+/// A voxel whose side the exact path tells.
+#[derive(Debug)]
+struct Close {
+    at: [usize; 2],
+    /// Its distance, where that is known.
+    size: Option<f64>,
 }
 
 impl TiltedSampler {
@@ -173,17 +179,16 @@ impl TiltedSampler {
         &self,
         body: &Revolved,
         grid: &GridSpec,
-        known: KnownLayer<'_>,
-        writing: Writing,
+        k: usize,
+        writing: Writing<'_>,
         scratch: &mut TiltedScratch,
         out: &mut [f32],
     ) {
-        let KnownLayer { k, inside } = known;
         let [nx, ny, _] = grid.dims();
         let view = self.view(k);
         let padded = nx.next_multiple_of(LANES);
         let together = (TOGETHER / (4 * nx)).clamp(1, ny);
-        scratch.doubts.resize(padded / LANES, 0);
+        scratch.marks.resize(padded / LANES, Marks::default());
         // The last row has room for its padding, too.
         scratch.rows.resize((together - 1) * nx + padded, 0.0);
         scratch.close.clear();
@@ -203,11 +208,11 @@ impl TiltedSampler {
                     points,
                     near,
                     &mut scratch.lanes,
-                    (row, &mut scratch.doubts),
+                    (row, &mut scratch.marks),
                 );
                 let row = &mut row[..nx];
-                let at = [first + n, k];
-                self.mend(view, at, inside, &scratch.doubts, row, &mut scratch.close);
+                let close = &mut scratch.close;
+                self.mend(view, first + n, &scratch.marks, row, close);
                 if writing.band.is_finite() {
                     for value in row {
                         *value = value.max(-band).min(band);
@@ -226,9 +231,10 @@ impl TiltedSampler {
                 to.copy_from_slice(from);
             }
         }
-        for &[i, j] in &scratch.close {
-            let side = bits::get(inside, j * nx + i);
-            let distance = body.distance(grid.centre(i, j, k), side, writing.band);
+        for &Close { at: [i, j], size } in &scratch.close {
+            let point = grid.centre(i, j, k);
+            let side = body.contains(point);
+            let distance = size.unwrap_or_else(|| body.distance(point, side, writing.band));
             out[j * nx + i] = stored(signed(distance, side).clamp(-writing.band, writing.band));
         }
     }
@@ -237,32 +243,31 @@ impl TiltedSampler {
     fn mend(
         &self,
         view: LayerView,
-        [j, _]: [usize; 2],
-        inside: &[u64],
-        doubts: &[u16],
+        j: usize,
+        marks: &[Marks],
         row: &mut [f32],
-        close: &mut Vec<[usize; 2]>,
+        close: &mut Vec<Close>,
     ) {
-        for (block, &marks) in doubts.iter().enumerate().filter(|(_, m)| **m != 0) {
-            let mut marks = marks;
+        let doubtful = marks.iter().map(|m| m.doubtful).enumerate();
+        for (block, mut marks) in doubtful.filter(|(_, m)| *m != 0) {
             while marks != 0 {
                 let i = block * LANES + marks.trailing_zeros() as usize;
                 marks &= marks - 1;
                 if i >= row.len() {
                     break;
                 }
+                #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+                let at = [i as f64, j as f64];
+                let mut size = None;
                 if row[i].is_nan() {
-                    #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-                    let at = [i as f64, j as f64];
                     if let Some(distance) = look_up_ridge(&self.table, view, at) {
                         row[i] = distance;
-                    } else if let Some(distance) = self.mended(view, at) {
-                        let side = bits::get(inside, j * row.len() + i);
-                        row[i] = stored(signed(distance, side));
+                    } else {
+                        size = self.mended(view, at).filter(|d| *d >= self.near);
                     }
                 }
-                if !(f64::from(row[i].abs()) >= self.near) {
-                    close.push([i, j]);
+                if size.is_some() || !(f64::from(row[i].abs()) >= self.near) {
+                    close.push(Close { at: [i, j], size });
                 }
             }
         }
