@@ -40,7 +40,7 @@ const COEFFICIENTS: usize = 1 << 22;
 /// Multiplications for one expansion, at most: a few seconds.
 const MOST_WORK: f64 = 4e9;
 
-/// Share of the product of the derivatives' lengths below which a determinant may be rounding.
+/// Share of the product of the derivatives' greatest lengths below which a determinant may be rounding.
 const ROUNDED: f64 = 1e-9;
 
 /// Whether a volume's parameters run like the axes of a right-handed or a left-handed frame.
@@ -293,18 +293,25 @@ impl NurbsVolume {
     /// more, ten at most.
     fn fold_at_points(&self, [start, end]: [[f64; 3]; 2]) -> Option<JacobianSign> {
         let points = self.degrees().map(|p| gauss_points((p + 1).min(10)));
-        let mut seen = Seen::default();
+        let mut lengths = [0.0_f64; 3];
+        let mut found = Vec::new();
         for index in indices(points.each_ref().map(Vec::len)) {
             let at = std::array::from_fn(|k| {
                 (start[k] + points[k][index[k]] * (end[k] - start[k])).min(end[k])
             });
-            let found = self.jacobian(at).ok()?;
-            let size: f64 = (found.columns.iter())
-                .map(|c| c.iter().map(|x| x * x).sum::<f64>().sqrt())
-                .product();
-            // Far above the rounding of a sum of (p + 1)^3 terms, and of their products.
-            if found.determinant.abs() > ROUNDED * size {
-                seen.note(found.determinant, at);
+            let jacobian = self.jacobian(at).ok()?;
+            for (length, column) in lengths.iter_mut().zip(jacobian.columns) {
+                *length = length.max(column.iter().map(|x| x * x).sum::<f64>().sqrt());
+            }
+            found.push((jacobian.determinant, at));
+        }
+        // Far above the rounding of a sum of (p + 1)^3 terms, and of their products: where a derivative
+        // vanishes what is left of it is rounding of the others.
+        let most = ROUNDED * lengths.iter().product::<f64>();
+        let mut seen = Seen::default();
+        for (determinant, at) in found {
+            if determinant.abs() > most {
+                seen.note(determinant, at);
             }
         }
         match seen {
