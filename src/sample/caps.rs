@@ -315,10 +315,13 @@ impl pulp::NullaryFnOnce for SweptGroups<'_> {
                 *gap = (-most * (1.0 - 1e-6)) as f32;
             }
         }
-        for g in 0..groups {
-            let gap = gaps[g];
-            let bits = u32::from(inside[g]);
-            let swept = &swept[g];
+        // Bound to what the loops go through: an index into a list in an inner loop costs the lanes.
+        let lists = gaps.iter().zip(inside).zip(swept).zip(out);
+        let flags = self.wanted[..groups]
+            .iter_mut()
+            .zip(&mut self.doubts[..groups]);
+        for ((((gap, bits), swept), out), (wanted_here, doubts_here)) in lists.zip(flags) {
+            let (gap, bits) = (*gap, u32::from(*bits));
             let wanted = gap < row.guard
                 || bits != 0 && {
                     // As whole numbers, whose largest the lanes may find in any order.
@@ -326,7 +329,7 @@ impl pulp::NullaryFnOnce for SweptGroups<'_> {
                     let deepest = f32::from_bits(bits);
                     gap < deepest
                 };
-            self.wanted[g] = wanted;
+            *wanted_here = wanted;
             if wanted {
                 continue;
             }
@@ -334,10 +337,10 @@ impl pulp::NullaryFnOnce for SweptGroups<'_> {
             for n in 0..GROUP {
                 let inside = (bits >> n) & 1;
                 let (value, doubt) = signed(swept[n].abs(), inside, least, band);
-                out[g][n] = value;
+                out[n] = value;
                 doubts |= doubt;
             }
-            self.doubts[g] = doubts != 0;
+            *doubts_here = doubts != 0;
         }
     }
 }
