@@ -116,23 +116,21 @@ pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]
     tile_numbers(&scale, [&r, &z], &mut tile);
     tile[0] = table.tiles().0[tile[0] as usize];
     cell_numbers(&scale, [&r, &z], &tile, &mut cell, [&mut ar, &mut az]);
-    let runs = table.ridge(&table.cells()[cell[0] as usize]);
-    // As many lanes as there are runs; the others have the first.
-    let mut four = runs.first()?.map(|number| [number; LANES]);
-    for (n, run) in runs.chunks_exact(PARTS).enumerate() {
+    let away = [ar[0], az[0]];
+    let mut nearest: Option<f32> = None;
+    for run in table
+        .ridge(&table.cells()[cell[0] as usize])
+        .chunks_exact(PARTS)
+    {
         let [along_r, along_z, off] = [0, 1, 2].map(|n| f32::from_bits(run[2][n]));
-        let beyond = along_r * ar[0] + along_z * az[0] + off > 0.0;
-        for (numbers, number) in four.iter_mut().zip(run[usize::from(beyond)]) {
-            numbers[n] = number;
-        }
+        let beyond = along_r * away[0] + along_z * away[1] + off > 0.0;
+        let value = circle(run[usize::from(beyond)], away, &scale.factors);
+        nearest = Some(match nearest {
+            Some(n) if n.abs() <= value.abs() => n,
+            _ => value,
+        });
     }
-    for numbers in &mut four {
-        let first = numbers[0];
-        numbers[runs.len() / PARTS..].fill(first);
-    }
-    let values = distances(&four, [&[ar[0]; LANES], &[az[0]; LANES]], &scale.factors);
-    let nearer = |a: f32, b: f32| if b.abs() < a.abs() { b } else { a };
-    Some(values.into_iter().fold(f32::INFINITY, nearer))
+    nearest
 }
 
 /// What turns places into numbers of tiles and cells, and cells into distances.
@@ -390,22 +388,27 @@ fn cell_numbers(
 
 /// The distances of a block.
 #[inline(always)]
-#[allow(clippy::cast_precision_loss, reason = "ten bits and the sign")]
 fn distances(four: &Four, away: [&[f32; LANES]; 2], factors: &[f32; 6]) -> [f32; LANES] {
     let mut out = [0.0; LANES];
-    let [f0, f1, f2, f3, f4, lost] = *factors;
     for n in 0..LANES {
-        let [d, gr, gz, kept] = [four[0][n], four[1][n], four[2][n], four[3][n]];
-        let bend = f32::from_bits(kept & !((1 << LOST_BITS) - 1));
-        let rest = (kept << (32 - LOST_BITS)).cast_signed() as f32 * lost;
-        let (r, z) = (away[0][n], away[1][n]);
-        let linear = f32::from_bits(gr) * r + f32::from_bits(gz) * z;
-        let e = linear + bend * (r * r + z * z);
-        let v = bend * e;
-        let series = f0 + v * (f1 + v * (f2 + v * (f3 + v * f4)));
-        out[n] = f32::from_bits(d) + (rest + e * series);
+        let cell = [four[0][n], four[1][n], four[2][n], four[3][n]];
+        out[n] = circle(cell, [away[0][n], away[1][n]], factors);
     }
     out
+}
+
+/// The distance to a cell's circle.
+#[inline(always)]
+#[allow(clippy::cast_precision_loss, reason = "ten bits and the sign")]
+fn circle([d, gr, gz, kept]: [u32; 4], [r, z]: [f32; 2], factors: &[f32; 6]) -> f32 {
+    let [f0, f1, f2, f3, f4, lost] = *factors;
+    let bend = f32::from_bits(kept & !((1 << LOST_BITS) - 1));
+    let rest = (kept << (32 - LOST_BITS)).cast_signed() as f32 * lost;
+    let linear = f32::from_bits(gr) * r + f32::from_bits(gz) * z;
+    let e = linear + bend * (r * r + z * z);
+    let v = bend * e;
+    let series = f0 + v * (f1 + v * (f2 + v * (f3 + v * f4)));
+    f32::from_bits(d) + (rest + e * series)
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -335,3 +335,33 @@ fn extent(start: [f64; 3], along: [[f64; 3]; 3], dims: [usize; 3], least: f64) -
         cell: step,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::solid::Body;
+
+    #[test]
+    fn ordinary_grids_have_a_table_and_those_without_room_have_none() {
+        let text = |direction: &str, rest: &str| {
+            format!(
+                "schema = 1\n[[solid]]\nkind = 'torus'\nmajor = 1\nminor = 0.3\naxis = {{ direction = {direction} }}\n{rest}"
+            )
+        };
+        let sampler = |text: &str, at: f64, spacing: f64| {
+            let scene = Scene::parse(text).expect("a scene");
+            let body = scene.assembly().single().and_then(Body::revolved);
+            let grid = GridSpec::new([40, 30, 20], DVec3::splat(at), DVec3::splat(spacing));
+            TiltedSampler::new(body.expect("a turned body"), &grid.expect("a grid")).is_some()
+        };
+        for direction in ["[1, 0, 0]", "[0, 1, 0]", "[0.3, -0.5, 0.8]"] {
+            assert!(sampler(&text(direction, ""), -1.5, 0.08));
+            assert!(sampler(&text(direction, ""), 0.5, 1e-4));
+        }
+        // Centres are rounded to more than a share of a voxel.
+        assert!(!sampler(&text("[1, 0, 0]", ""), 1e6, 1e-6));
+        // A partial turn has caps.
+        assert!(!sampler(&text("[1, 0, 0]", "angle = 90\n"), -1.5, 0.08));
+    }
+}
