@@ -235,6 +235,7 @@ impl<'a> LayerSampler<'a> {
     pub fn shared_bytes(&self) -> u64 {
         let full = self.radial.as_ref().map_or(0, RadialSampler::bytes);
         full + self.partial.as_ref().map_or(0, PartialSampler::bytes)
+            + self.tilted.as_ref().map_or(0, TiltedSampler::bytes)
     }
 
     /// Fills `out` with layer `k`.

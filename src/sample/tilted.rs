@@ -137,6 +137,11 @@ impl TiltedSampler {
         })
     }
 
+    /// Bytes that all threads share.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.field.bytes() + self.table.bytes()) as u64
+    }
+
     /// A layer as places see it.
     #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
     fn view(&self, k: usize) -> LayerView {
@@ -212,7 +217,13 @@ impl TiltedSampler {
                 );
                 let row = &mut row[..nx];
                 let close = &mut scratch.close;
-                self.mend(view, first + n, &scratch.marks, row, close);
+                self.mend(
+                    writing.kernel,
+                    (view, first + n),
+                    &scratch.marks,
+                    row,
+                    close,
+                );
                 if writing.band.is_finite() {
                     for value in row {
                         *value = value.max(-band).min(band);
@@ -242,8 +253,8 @@ impl TiltedSampler {
     /// Completes row (j, k) where it has doubts; adds to `close` what is left to the exact path.
     fn mend(
         &self,
-        view: LayerView,
-        j: usize,
+        kernel: Kernel,
+        (view, j): (LayerView, usize),
         marks: &[Marks],
         row: &mut [f32],
         close: &mut Vec<Close>,
@@ -263,7 +274,7 @@ impl TiltedSampler {
                     if let Some(distance) = look_up_ridge(&self.table, view, at) {
                         row[i] = distance;
                     } else {
-                        size = self.mended(view, at).filter(|d| *d >= self.near);
+                        size = self.mended(kernel, view, at).filter(|d| *d >= self.near);
                     }
                 }
                 if size.is_some() || !(f64::from(row[i].abs()) >= self.near) {
@@ -279,7 +290,7 @@ impl TiltedSampler {
         clippy::cast_sign_loss,
         reason = "places are within the lattice"
     )]
-    fn mended(&self, view: LayerView, [i, j]: [f64; 2]) -> Option<f64> {
+    fn mended(&self, kernel: Kernel, view: LayerView, [i, j]: [f64; 2]) -> Option<f64> {
         let x = view.x[0] + j * view.x[2] + i * view.x[1];
         let y = view.y[0] + j * view.y[1];
         let away = [
@@ -292,11 +303,7 @@ impl TiltedSampler {
         let per = self.table.places();
         let q = [corner[0] + away[0] / per, corner[1] + away[1] / per];
         let unit = self.table.step() / self.field.cell();
-        Some(
-            self.field
-                .distance(Kernel::default(), self.field.leaf(leaf), q)
-                * unit,
-        )
+        Some(self.field.distance(kernel, self.field.leaf(leaf), q) * unit)
     }
 }
 
