@@ -7,7 +7,7 @@
 //!   sdf/SCENE/KERNEL          the whole grid, f32
 //!   band/SCENE/KERNEL         distances clamped to three voxels
 //!   exact/SCENE               distances by the exact path alone, of a few rows: what a voxel costs without tables
-//!   formula                   sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid
+//!   formula                   sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid, its centre included
 //!   fill/TYPE                 what writing takes: the same buffers, the same threads
 //! ```
 //!
@@ -98,6 +98,7 @@ fn sampling(c: &mut Criterion) {
         check(&scene, &grid, &occupancy, &sdf);
         let expected = (occupancy.clone(), sdf.clone());
 
+        let [nx, ny, nz] = grid.dims();
         let mut group = c.benchmark_group("sample");
         group.sample_size(10);
         group.bench_function(BenchmarkId::new("prepare", name), |b| {
@@ -134,12 +135,17 @@ fn sampling(c: &mut Criterion) {
             });
         }
         if name == "torus" {
+            formula(&grid, &mut sdf);
+            for n in (0..sdf.len()).step_by(sdf.len() / 997) {
+                let (i, j, k) = (n % nx, n / nx % ny, n / (nx * ny));
+                let exact = scene.assembly().signed_distance(grid.centre(i, j, k));
+                assert!((f64::from(sdf[n]) - exact).abs() <= 1e-6, "the formula");
+            }
             group.bench_function("formula", |b| b.iter(|| formula(&grid, &mut sdf)));
         }
         group.bench_function(BenchmarkId::new("fill/f32", name), |b| {
             b.iter(|| filled(&mut sdf, black_box(2.0)));
         });
-        let [nx, ny, nz] = grid.dims();
         group.throughput(Throughput::Elements(nx as u64));
         group.bench_function(BenchmarkId::new("exact", name), |b| {
             let mut j = 0;

@@ -89,9 +89,10 @@
 //! with a bound on the rounding and, where the bound does not decide, in double-double; no
 //! tolerance takes part beyond the one that calls a point at 2^-88 of the profile on its boundary.
 //! Distances are minima over all stationary points of rational pieces, isolated by the signs of
-//! Bernstein coefficients. Voxels of a solid with an upright axis take theirs from tables that are proved to be within a
-//! few 1e-5 of a voxel: distances to arcs that are proved near the profile, in cubics with a bound. Fractions are integrals of closed-form areas. Volume, area and moments are line integrals along the
-//! profile in double-double, with estimates of their errors. Nothing is sampled.
+//! Bernstein coefficients. Voxels of one solid of revolution take theirs from tables that are proved to be within a few
+//! 1e-5 of a voxel: distances to arcs that are proved near the profile, in cubics or circles with a bound. Fractions are
+//! integrals of closed-form areas. Volume, area and moments are line integrals along the profile in double-double, with
+//! estimates of their errors. Nothing is sampled.
 //!
 //! For a volume the net is the solid: points are inverted in Bézier cells that are halved until the map is proved one
 //! to one, and roots at faces are found again in double-double; distances are certified minima over the outer faces;

@@ -456,6 +456,10 @@ mod tests {
         fn moments_follow_affine_maps(map in maps::<3>()) {
             // Weights that differ a hundredfold from one control point to the next take their time.
             prop_assume!(map.knots().iter().map(|k| k.spans().count()).product::<usize>() <= 3);
+            // Short coordinates, so that the map's image has no rounding of its own.
+            let short = |p: &[f64; 3]| p.map(|x| (x * 1_048_576.0).round() / 1_048_576.0);
+            let points = map.control_points().iter().map(short).collect();
+            let map = NurbsVolume::new(map.knots().clone(), points, map.weights().to_vec()).expect("valid");
             let whole = map.moments().expect("finite");
             let matrix = [[2.0, 0.5, 0.0], [0.0, 1.0, -0.25], [1.0, 0.0, 1.5]];
             let image = map.transform(&matrix, &[0.0; 3]).expect("finite").moments().expect("finite");

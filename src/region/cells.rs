@@ -294,7 +294,7 @@ impl<'a> Tiles<'a> {
     /// The circle of one cell, or where it is one of the `finest` all that may be nearest in it.
     fn circle(&mut self, number: u32, square: Square, finest: bool) -> Result<Cell, Refusal> {
         let leaf: &Leaf = self.field.leaf(number);
-        if !leaf.smooth {
+        if !leaf.is_smooth() {
             return Err(Refusal::Never);
         }
         if self.near.leaf != Some(number) {

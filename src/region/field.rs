@@ -4,7 +4,7 @@
 //! diagonal, those no further from `c` than the nearest one plus 2 ρ, since no distance changes faster than the
 //! point moves. They form runs that follow each other along the boundary. A cell is a leaf when it has one run and
 //! that is smooth in it ([`Chain::is_smooth`]); or a few such, between which the distance has a ridge, and is small;
-//! or when it is as small as cells become.
+//! or when it is as small as cells become. One as small that has many features is divided a little further.
 //!
 //! Lengths are in the region's unit. Cells are counted from `first` in units of the smallest.
 
@@ -27,7 +27,7 @@ pub(crate) struct MeridianField {
     /// The root is 2^levels cells wide.
     levels: u32,
     root: Node,
-    /// The four quarters of each node that has any.
+    /// The four quarters of each node, and of each leaf, that has any.
     quarters: Vec<[Node; 4]>,
     leaves: Vec<Leaf>,
     /// The smooth leaves' features.
@@ -46,16 +46,59 @@ enum Node {
     Empty,
 }
 
-/// A cell that is not divided.
+/// A cell that is not divided, or a smallest one, or a part of that.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leaf {
-    /// Its part of the pool, or of the eights.
+    /// Its part of the list that its kind has.
     start: u32,
     len: u32,
-    /// Whether the features kept are one of each of its smooth runs, from which walking finds that run's nearest, in
-    /// the pool; else they are all that may be nearest, the one nearest to the centre first, in eights.
-    pub(crate) smooth: bool,
+    kind: Kind,
     centre: [f64; 2],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// In the pool there is one of each of its smooth runs, from which walking finds that run's nearest.
+    Smooth,
+    /// In the eights there are all that may be nearest, the one nearest to the centre first.
+    Listed,
+    /// In the quarters there are its four.
+    Divided,
+}
+
+impl Leaf {
+    /// Whether the distance is smooth but for ridges between a few runs.
+    pub(crate) fn is_smooth(&self) -> bool {
+        self.kind == Kind::Smooth
+    }
+}
+
+/// A cell, or a part of one.
+#[derive(Debug, Clone, Copy)]
+struct Square {
+    low: [f64; 2],
+    side: f64,
+}
+
+impl Square {
+    fn centre(self) -> [f64; 2] {
+        self.low.map(|c| c + 0.5 * self.side)
+    }
+
+    fn corners(self) -> [[f64; 2]; 4] {
+        let Self { low: [r, z], side } = self;
+        [[r, z], [r + side, z], [r, z + side], [r + side, z + side]]
+    }
+
+    fn quarters(self) -> [Self; 4] {
+        let [r, z] = self.low;
+        let side = 0.5 * self.side;
+        [[r, z], [r + side, z], [r, z + side], [r + side, z + side]].map(|low| Self { low, side })
+    }
+}
+
+fn number(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 /// The part of the half-plane that a field covers, in the region's unit.
@@ -76,6 +119,10 @@ const LEVELS_OF_RUNS: [u32; MOST_RUNS] = [u32::MAX, 3, 2, 1];
 /// The most features looked at, over all cells: a fraction of a second, and a bound on the memory. A boundary that takes more
 /// has detail finer than the cells almost everywhere.
 const MOST_WORK: usize = 20_000_000;
+/// Halvings of a smallest cell where the distance is not smooth and the features are more than [`FEW`].
+const FINER: u32 = 2;
+/// So many features take one look.
+const FEW: usize = 8;
 /// The most eights of features: some 150 MB.
 const MOST_EIGHTS: usize = 1 << 18;
 /// The most cells along a side of the rectangle.
@@ -171,7 +218,7 @@ impl MeridianField {
 
     /// The features kept of a smooth leaf, none of another.
     pub(crate) fn features(&self, leaf: &Leaf) -> &[u32] {
-        if leaf.smooth {
+        if leaf.is_smooth() {
             &self.pool[leaf.start as usize..(leaf.start + leaf.len) as usize]
         } else {
             &[]
@@ -196,77 +243,99 @@ impl MeridianField {
         if at[0] >= self.size[0] || at[1] >= self.size[1] {
             return Node::Empty;
         }
-        self.work += list.len();
-        if self.work > MOST_WORK || self.eights.len() > MOST_EIGHTS {
-            return Node::Empty;
-        }
-        let side = f64::from(1_u32 << level) * self.cell;
-        let low = self.corner(at);
-        let centre = low.map(|c| c + 0.5 * side);
-        // A hair more covers the rounding of the distances.
-        let radius = side * (0.5_f64.sqrt() * (1.0 + 1e-9)) + 1e-14;
-        let mut nearest = f64::INFINITY;
-        let distances: Vec<f64> = (list.iter())
-            .map(|&i| {
-                let d = self.chain.distance(i, centre);
-                nearest = nearest.min(d);
-                d
-            })
-            .collect();
-        let limit = nearest + 2.0 * radius;
-        let kept: Vec<u32> = (list.iter().zip(&distances))
-            .filter(|(_, d)| **d <= limit)
-            .map(|(i, _)| *i)
-            .collect();
-        let corners = [
-            low,
-            [low[0] + side, low[1]],
-            [low[0], low[1] + side],
-            [low[0] + side, low[1] + side],
-        ];
-        if let Some(runs) = self.chain.runs(&kept) {
-            let parts = runs.iter().flat_map(|run| self.chain.parts(run, &corners));
-            let parts: Vec<&[u32]> = parts.collect();
-            if (1..=MOST_RUNS).contains(&parts.len())
-                && level <= LEVELS_OF_RUNS[parts.len() - 1]
-                && parts
-                    .iter()
-                    .all(|part| self.chain.is_smooth(part, &corners))
-            {
-                let middles: Vec<u32> = parts.iter().map(|part| part[part.len() / 2]).collect();
-                let start = self.pool.len();
-                self.pool.extend(middles);
-                return self.add_leaf([start, self.pool.len()], true, centre);
-            }
-        }
+        let square = Square {
+            low: self.corner(at),
+            side: f64::from(1_u32 << level) * self.cell,
+        };
+        let kept = match self.sorted(square, level, list) {
+            Ok(node) => return node,
+            Err(kept) => kept,
+        };
         if level == 0 {
-            let mut sorted: Vec<(u32, f64)> = (list.iter().copied())
-                .zip(distances)
-                .filter(|(_, d)| *d <= limit)
-                .collect();
-            sorted.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-            let shapes = sorted.iter().map(|(i, d)| (self.chain.shape(*i), *d));
-            let shapes: Vec<_> = shapes.collect();
-            let start = self.eights.len();
-            self.eights.extend(in_eights(&shapes));
-            return self.add_leaf([start, self.eights.len()], false, centre);
+            return self.fine(square, &kept, FINER);
         }
+        let kept: Vec<u32> = kept.into_iter().map(|(i, _)| i).collect();
         let half = 1 << (level - 1);
         let quarters = [0, 1, 2, 3].map(|q: u32| {
             let corner = [at[0] + (q & 1) * half, at[1] + (q >> 1) * half];
             self.node(corner, level - 1, &kept)
         });
         self.quarters.push(quarters);
-        Node::Quarters(u32::try_from(self.quarters.len() - 1).unwrap_or(u32::MAX))
+        Node::Quarters(number(self.quarters.len() - 1))
     }
 
-    /// Adds a leaf with its part of the pool or of the eights.
-    fn add_leaf(&mut self, [start, end]: [usize; 2], smooth: bool, centre: [f64; 2]) -> Node {
-        let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    /// The leaf of a square in which the distance is smooth, or has few ridges; else the features that may be nearest
+    /// in it, with their distances from its centre.
+    fn sorted(
+        &mut self,
+        square: Square,
+        level: u32,
+        list: &[u32],
+    ) -> Result<Node, Vec<(u32, f64)>> {
+        self.work += list.len();
+        if self.work > MOST_WORK || self.eights.len() > MOST_EIGHTS {
+            return Ok(Node::Empty);
+        }
+        let (side, centre) = (square.side, square.centre());
+        // A hair more covers the rounding of the distances.
+        let radius = side * (0.5_f64.sqrt() * (1.0 + 1e-9)) + 1e-14;
+        let mut nearest = f64::INFINITY;
+        let mut kept: Vec<(u32, f64)> = (list.iter())
+            .map(|&i| {
+                let d = self.chain.distance(i, centre);
+                nearest = nearest.min(d);
+                (i, d)
+            })
+            .collect();
+        let limit = nearest + 2.0 * radius;
+        kept.retain(|(_, d)| *d <= limit);
+        let corners = square.corners();
+        let rising: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
+        if let Some(runs) = self.chain.runs(&rising) {
+            let parts = runs.iter().flat_map(|run| self.chain.parts(run, &corners));
+            let parts: Vec<&[u32]> = parts.collect();
+            if (1..=MOST_RUNS).contains(&parts.len())
+                && level <= LEVELS_OF_RUNS[parts.len() - 1]
+                && (parts.iter()).all(|part| self.chain.is_smooth(part, &corners))
+            {
+                let middles: Vec<u32> = parts.iter().map(|part| part[part.len() / 2]).collect();
+                let start = self.pool.len();
+                self.pool.extend(middles);
+                return Ok(self.add_leaf(Kind::Smooth, [start, self.pool.len()], centre));
+            }
+        }
+        Err(kept)
+    }
+
+    /// The leaf of a smallest cell, or of a part of one, in which the distance is not smooth: divided `deeper` times
+    /// more where it has many features.
+    fn fine(&mut self, square: Square, kept: &[(u32, f64)], deeper: u32) -> Node {
+        let centre = square.centre();
+        if deeper > 0 && kept.len() > FEW {
+            let list: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
+            let quarters = square.quarters().map(|part| {
+                (self.sorted(part, 0, &list))
+                    .unwrap_or_else(|kept| self.fine(part, &kept, deeper - 1))
+            });
+            let start = self.quarters.len();
+            self.quarters.push(quarters);
+            return self.add_leaf(Kind::Divided, [start, start + 1], centre);
+        }
+        let mut sorted = kept.to_vec();
+        sorted.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+        let shapes = sorted.iter().map(|(i, d)| (self.chain.shape(*i), *d));
+        let shapes: Vec<_> = shapes.collect();
+        let start = self.eights.len();
+        self.eights.extend(in_eights(&shapes));
+        self.add_leaf(Kind::Listed, [start, self.eights.len()], centre)
+    }
+
+    /// Adds a leaf with its part of the list that its kind has.
+    fn add_leaf(&mut self, kind: Kind, [start, end]: [usize; 2], centre: [f64; 2]) -> Node {
         self.leaves.push(Leaf {
             start: number(start),
             len: number(end - start),
-            smooth,
+            kind,
             centre,
         });
         Node::Leaf(number(self.leaves.len() - 1))
@@ -274,7 +343,17 @@ impl MeridianField {
 
     /// The unsigned distance of a point of a leaf.
     pub(crate) fn distance(&self, kernel: Kernel, leaf: &Leaf, q: [f64; 2]) -> f64 {
-        if leaf.smooth {
+        let mut leaf = leaf;
+        while leaf.kind == Kind::Divided {
+            let quarter =
+                usize::from(q[0] >= leaf.centre[0]) + 2 * usize::from(q[1] >= leaf.centre[1]);
+            match self.quarters[leaf.start as usize][quarter] {
+                Node::Leaf(number) => leaf = self.leaf(number),
+                // Parts of cells are leaves.
+                Node::Quarters(_) | Node::Empty => return f64::NAN,
+            }
+        }
+        if leaf.kind == Kind::Smooth {
             let sizes = self.features(leaf).iter().map(|&i| {
                 let local = self.chain.local(self.chain.walk(i, q), q);
                 local.value.abs()
@@ -328,7 +407,7 @@ impl MeridianField {
     /// How many leaves there are, and how many of them are smooth.
     #[cfg(test)]
     pub(crate) fn census(&self) -> (usize, usize) {
-        let smooth = self.leaves.iter().filter(|l| l.smooth);
+        let smooth = self.leaves.iter().filter(|l| l.is_smooth());
         (self.leaves.len(), smooth.count())
     }
 }

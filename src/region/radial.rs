@@ -104,7 +104,7 @@ impl RadialTable {
             self.leaves[from..to].fill(number);
             let leaf = field.leaf(number);
             let features = field.features(leaf);
-            match (leaf.smooth, features.len()) {
+            match (leaf.is_smooth(), features.len()) {
                 (false, _) => (from..to).for_each(|k| self.leave_open(k)),
                 (true, 1) => {
                     let mut near = Foot::new(field, features[0], [node(from), z]);
