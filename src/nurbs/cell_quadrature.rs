@@ -40,6 +40,10 @@ const AGREEMENT: f64 = 2e-15;
 /// in the last place go into a determinant, and few of them have the same sign.
 const ROUNDING: f64 = 32.0 * U;
 
+/// Rounding of a cell's control points, as a share of their distance from its middle: the knots and weights they are
+/// made with have it. It moves the cell's faces, which counts where the cell is thin.
+const MOVED: f64 = 4.0 * U;
+
 /// Points of one cell, at most; about a second's work.
 const POINTS: usize = 2_000_000;
 
@@ -56,6 +60,7 @@ static RULES: LazyLock<Vec<Vec<(f64, f64)>>> = LazyLock::new(|| {
 ///
 /// * `integrand`: from A, w and their derivatives, the K values and what their rounding is relative
 ///   to.
+/// * `powers`: for each of the K, the power of the distance from the middle that it has beside the N derivatives.
 #[allow(
     clippy::type_complexity,
     reason = "an origin and K integrals for each cell"
@@ -63,6 +68,7 @@ static RULES: LazyLock<Vec<Vec<(f64, f64)>>> = LazyLock::new(|| {
 pub(super) fn integrate_cells<const N: usize, const K: usize>(
     map: &NurbsTensor<N>,
     integrand: impl Fn(Homogeneous<3>, &[Homogeneous<3>; N]) -> ([f64; K], [f64; K]) + Sync,
+    powers: [i32; K],
 ) -> Result<Vec<([f64; 3], [Integral; K])>, NurbsError> {
     let spans = Spans::new(map);
     let cells: Vec<_> = indices(spans.cells).collect();
@@ -74,7 +80,12 @@ pub(super) fn integrate_cells<const N: usize, const K: usize>(
             points,
             integrand: &integrand,
         };
-        Ok((origin, cell.integrate()))
+        let (moved, reach) = cell.moved();
+        let mut parts: [Integral; K] = cell.integrate();
+        for (part, power) in parts.iter_mut().zip(powers) {
+            part.error += moved * reach.powi(power);
+        }
+        Ok((origin, parts))
     };
     cells.into_par_iter().map(one).collect()
 }
@@ -107,6 +118,33 @@ impl<F, const N: usize, const K: usize> Cell<'_, F, N>
 where
     F: Fn(Homogeneous<3>, &[Homogeneous<3>; N]) -> ([f64; K], [f64; K]) + Sync,
 {
+    /// What the rounding of the control points may do to the content of the cell, and how far they are from its middle:
+    /// a direction's width moves by the rounding, times what the others span.
+    fn moved(&self) -> (f64, f64) {
+        let points: Vec<[f64; 3]> = self.points.iter().map(|h| h.to_point()).collect();
+        let length = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let reach = points.iter().fold(0.0_f64, |m, p| m.max(length(*p)));
+        let mut stride = 1;
+        let spans = self.degrees.map(|p| {
+            let pairs = (0..points.len()).filter(|i| i / stride % (p + 1) < p);
+            let widest = pairs.fold(0.0_f64, |m, i| {
+                let (a, b) = (points[i], points[i + stride]);
+                m.max(length(std::array::from_fn(|c| b[c] - a[c])))
+            });
+            stride *= p + 1;
+            #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
+            let span = p as f64 * widest;
+            span
+        });
+        let others = |k: usize| {
+            (0..N)
+                .filter(|j| *j != k)
+                .map(|j| spans[j])
+                .product::<f64>()
+        };
+        (MOVED * reach * (0..N).map(others).sum::<f64>(), reach)
+    }
+
     /// The integrals over the cell.
     fn integrate(&self) -> [Integral; K] {
         let polynomial = self.points.windows(2).all(|h| h[0].weight == h[1].weight);

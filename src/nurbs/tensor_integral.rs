@@ -69,7 +69,7 @@ impl NurbsVolume {
     /// # Errors
     /// Those of [`moments`](Self::moments).
     pub fn moments_about(&self, origin: [f64; 3]) -> Result<MapMoments, NurbsError> {
-        let parts = integrate_cells(self, |value, slopes: &[Homogeneous<3>; 3]| {
+        let integrand = |value: Homogeneous<3>, slopes: &[Homogeneous<3>; 3]| {
             let w = value.weight;
             let x = value.to_point();
             let jacobian = determinant([value, slopes[0], slopes[1], slopes[2]]) / w.powi(4);
@@ -90,7 +90,8 @@ impl NurbsVolume {
                 _ => terms * length * length,
             };
             (powers.map(|p| p * jacobian), std::array::from_fn(size))
-        })?;
+        };
+        let parts = integrate_cells(self, integrand, [0, 1, 1, 1, 2, 2, 2, 2, 2, 2])?;
         let mut total = [Sum::default(); 10];
         for (cell, part) in &parts {
             let shift = std::array::from_fn(|i| cell[i] - origin[i]);
@@ -132,7 +133,7 @@ impl NurbsSurface {
     /// # Ok::<(), voxlathe::nurbs::NurbsError>(())
     /// ```
     pub fn area(&self) -> Result<Integral, NurbsError> {
-        let parts = integrate_cells(self, |value, slopes: &[Homogeneous<3>; 2]| {
+        let integrand = |value: Homogeneous<3>, slopes: &[Homogeneous<3>; 2]| {
             let x = value.to_point();
             let slope = |h: &Homogeneous<3>| -> [f64; 3] {
                 std::array::from_fn(|i| (h.weighted[i] - h.weight * x[i]) / value.weight)
@@ -149,7 +150,8 @@ impl NurbsSurface {
             let normal = cross(u, v);
             let area = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
             ([area], [terms])
-        })?;
+        };
+        let parts = integrate_cells(self, integrand, [0])?;
         let mut total = Sum::default();
         for (_, [part]) in parts {
             total.add(part);
@@ -456,10 +458,6 @@ mod tests {
         fn moments_follow_affine_maps(map in maps::<3>()) {
             // Weights that differ a hundredfold from one control point to the next take their time.
             prop_assume!(map.knots().iter().map(|k| k.spans().count()).product::<usize>() <= 3);
-            // Short coordinates, so that the map's image has no rounding of its own.
-            let short = |p: &[f64; 3]| p.map(|x| (x * 1_048_576.0).round() / 1_048_576.0);
-            let points = map.control_points().iter().map(short).collect();
-            let map = NurbsVolume::new(map.knots().clone(), points, map.weights().to_vec()).expect("valid");
             let whole = map.moments().expect("finite");
             let matrix = [[2.0, 0.5, 0.0], [0.0, 1.0, -0.25], [1.0, 0.0, 1.5]];
             let image = map.transform(&matrix, &[0.0; 3]).expect("finite").moments().expect("finite");

@@ -101,11 +101,12 @@ impl CellTable {
             .map(|row| {
                 let mut tiles = Tiles::new(field, scale, tolerance);
                 for column in 0..across {
-                    let before = tiles.cells.len();
+                    let before = tiles.cells.len() + tiles.ridges.len();
                     if made.load(Ordering::Relaxed) <= MOST_CELLS {
                         tiles.add([column, row]);
                     }
-                    made.fetch_add(tiles.cells.len() - before, Ordering::Relaxed);
+                    let after = tiles.cells.len() + tiles.ridges.len();
+                    made.fetch_add(after - before, Ordering::Relaxed);
                 }
                 tiles
             })
@@ -365,7 +366,7 @@ impl<'a> Tiles<'a> {
         let w = square.half_diagonal();
         let [(_, a), (_, b)] = [near, other];
         let gap = b.value.abs() - a.value.abs();
-        if gap > 2.0 * w * (1.0 + 1e-9) {
+        if gap > 2.0 * w * (1.0 + 1e-9) + self.field.chain().margin() {
             return true;
         }
         // Neither changes its sign.
@@ -383,6 +384,8 @@ impl<'a> Tiles<'a> {
         let chain = self.field.chain();
         let departures =
             || [near, other].map(|(feature, _)| chain.departure(feature, &square.corners()));
+        // The sign is that of the surface that is nearer, not of its arc.
+        let least = least + if s == t { 0.0 } else { chain.margin() };
         gap > least && gap > least + departures().iter().sum::<f64>()
     }
 

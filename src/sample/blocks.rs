@@ -116,7 +116,7 @@ impl BlockLayer<'_> {
                     let (i, j) = (i + n % LAST, j + n / LAST);
                     if i < nx && j < ny {
                         let at = [f64::from(i), f64::from(j)];
-                        let known = look_up_ridge(self.table, self.view, at);
+                        let known = look_up_ridge(self.table, self.view, at, near);
                         let holds = known
                             .filter(|d| d.abs() >= near)
                             .map_or_else(|| ask(i as usize, j as usize), |d| d < 0.0);

@@ -107,8 +107,14 @@ pub(super) fn look_up(
 }
 
 /// The signed distance at one point of a layer whose cell has several circles, from the nearest of them; `None` where it
-/// has none.
-pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]) -> Option<f32> {
+/// has none, or where circles of either sign are so near to each other, within `apart`, that their errors might decide
+/// between them.
+pub(super) fn look_up_ridge(
+    table: &CellTable,
+    view: LayerView,
+    [i, j]: [f64; 2],
+    apart: f32,
+) -> Option<f32> {
     let (mut r, mut z, mut tile, mut cell) = ([0], [0], [0], [0]);
     let (mut ar, mut az) = ([0.0], [0.0]);
     any_places(&view, [&[i], &[j]], [&mut r, &mut z]);
@@ -117,7 +123,8 @@ pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]
     tile[0] = table.tiles().0[tile[0] as usize];
     cell_numbers(&scale, [&r, &z], &tile, &mut cell, [&mut ar, &mut az]);
     let away = [ar[0], az[0]];
-    let mut nearest: Option<f32> = None;
+    // The least distance of those inside, and of those outside.
+    let mut least = [f32::INFINITY; 2];
     for run in table
         .ridge(&table.cells()[cell[0] as usize])
         .chunks_exact(PARTS)
@@ -125,12 +132,14 @@ pub(super) fn look_up_ridge(table: &CellTable, view: LayerView, [i, j]: [f64; 2]
         let [along_r, along_z, off] = [0, 1, 2].map(|n| f32::from_bits(run[2][n]));
         let beyond = along_r * away[0] + along_z * away[1] + off > 0.0;
         let value = circle(run[usize::from(beyond)], away, &scale.factors);
-        nearest = Some(match nearest {
-            Some(n) if n.abs() <= value.abs() => n,
-            _ => value,
-        });
+        let side = &mut least[usize::from(value > 0.0)];
+        *side = side.min(value.abs());
     }
-    nearest
+    let [inside, outside] = least;
+    let nearest = if inside < outside { -inside } else { outside };
+    let rounding = 4.0 * f32::EPSILON * nearest.abs();
+    // Infinite where there is none of either sign, or none at all.
+    (nearest.is_finite() && (inside - outside).abs() > apart + rounding).then_some(nearest)
 }
 
 /// What turns places into numbers of tiles and cells, and cells into distances.

@@ -197,6 +197,9 @@ impl PartialSampler {
         queue.start(nx);
         let rows = self.plane.len();
         for n in 0..rows {
+            if writing.cancel.is_some_and(|cancel| cancel()) {
+                return;
+            }
             self.swept_row(&layer, self.plane.radii(n..n + 1), distances, marks);
             let twin = self.plane.twin(n);
             for (j, is_twin) in std::iter::once((n, false)).chain(twin.map(|t| (t, true))) {

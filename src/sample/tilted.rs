@@ -11,7 +11,8 @@
 //! ```
 //!
 //! * arcs and cells are proved in [`crate::region`];
-//! * a place has 15 bits after the point at least, 2^-16 off at most in r and in z; with the 20 that grids of less than
+//! * a place has 18 bits after the point at least, 2^-19 of a step of up to four least spacings off at most in r and in
+//!   z; with the 20 that grids of less than
 //!   1024 voxels have it is 1e-6;
 //! * the sums: a cell's numbers are f32 and its points at most 2.9 steps from the centre, so each of the ten roundings
 //!   is of a number below 3 steps, 2e-7 of them; what the distance lost at the centre is kept to 5e-8. That stays below
@@ -41,8 +42,11 @@ const TOGETHER: usize = 1 << 16;
 const FINEST: f64 = 1e-12;
 /// What world coordinates may be rounded by, as a share of the least spacing.
 const ROUNDING: f64 = 1e-6;
+/// The most squares of a step that the table covers, for each voxel and beside.
+const MOST_PER_VOXEL: f64 = 4.0;
+const FEW_STEPS: f64 = 10_000.0;
 /// The most steps along r or z; the table of a grid with more has coarser ones.
-const MOST_STEPS: f64 = 8192.0;
+const MOST_STEPS: f64 = 4000.0;
 /// Steps are at most this many times the least spacing.
 const COARSEST: f64 = 4.0;
 
@@ -101,6 +105,13 @@ impl TiltedSampler {
         let along =
             [DVec3::X, DVec3::Y, DVec3::Z].map(|e| frame.vector_to_local(e * spacing).to_array());
         let extent = extent(start, along, grid.dims(), least / scale)?;
+        let steps = |[a, b]: [f64; 2]| (b - a) / extent.cell;
+        #[allow(clippy::cast_precision_loss, reason = "a comparison")]
+        let voxels = grid.voxel_count() as f64;
+        if steps(extent.r) * steps(extent.z) > MOST_PER_VOXEL * voxels + FEW_STEPS {
+            // The exact path answers so few voxels sooner.
+            return None;
+        }
         let swept: Vec<_> = (body.boundary().iter())
             .filter(|b| !b.piece.on_axis)
             .cloned()
@@ -241,8 +252,24 @@ impl TiltedSampler {
             } else {
                 to.copy_from_slice(from);
             }
+            self.settle(body, (grid, k), writing, &mut scratch.close, out);
         }
-        for &Close { at: [i, j], size } in &scratch.close {
+    }
+
+    /// Asks the exact path for the voxels of layer `k` that are left to it.
+    fn settle(
+        &self,
+        body: &Revolved,
+        (grid, k): (&GridSpec, usize),
+        writing: Writing<'_>,
+        close: &mut Vec<Close>,
+        out: &mut [f32],
+    ) {
+        let nx = grid.dims()[0];
+        for Close { at: [i, j], size } in close.drain(..) {
+            if writing.cancel.is_some_and(|cancel| cancel()) {
+                return;
+            }
             let point = grid.centre(i, j, k);
             let side = body.contains(point);
             let distance = size.unwrap_or_else(|| body.distance(point, side, writing.band));
@@ -269,9 +296,11 @@ impl TiltedSampler {
                 }
                 #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
                 let at = [i as f64, j as f64];
+                #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
+                let near = self.near as f32;
                 let mut size = None;
                 if row[i].is_nan() {
-                    if let Some(distance) = look_up_ridge(&self.table, view, at) {
+                    if let Some(distance) = look_up_ridge(&self.table, view, at, near) {
                         row[i] = distance;
                     } else {
                         size = self.mended(kernel, view, at).filter(|d| *d >= self.near);

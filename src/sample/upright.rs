@@ -7,8 +7,8 @@
 //!   |i - c| <= m,   m = sqrt(D) / h,   D = R² - y²      i the voxel's number, c the axis's, h the spacing
 //! ```
 //!
-//! D is known up to its rounding w, and m up to `w / h²` where it is at least a voxel, since
-//! `sqrt(D) - sqrt(D - w) <= w / sqrt(D)`. A voxel that the bounds leave open, hardly ever any, is asked alone, and
+//! D is known up to its rounding w, and m up to `w / (h sqrt(D))`, since `sqrt(D) - sqrt(D - w) <= w / sqrt(D)`, where
+//! m is at least a voxel. A voxel that the bounds leave open, hardly ever any, is asked alone, and
 //! so are the few of a row that the circle only touches. A row and the one that mirrors it have the same ends. A
 //! wedge is the same in all layers and is kept as bits.
 
@@ -23,6 +23,8 @@ pub(super) struct UprightBody {
     /// Squared distance from the axis, in voxels, of each row up to the one in the middle, or of all where the axis
     /// is not in their middle.
     squares: Vec<f64>,
+    /// The greatest of them.
+    widest: f64,
     /// How much a row and the one that mirrors it differ, in voxels.
     asymmetry: f64,
     /// Place of the axis in a row, in voxels.
@@ -79,6 +81,7 @@ impl UprightBody {
         let slack = 4.0 * f64::EPSILON * far / step + 16.0 * f64::EPSILON * (centre.abs() + last);
         (slack < 0.25 && nx < 1 << 30).then(|| Self {
             squares: rows[..kept].iter().map(|y| y * y).collect(),
+            widest: rows.iter().fold(0.0, |m, y| (y * y).max(m)),
             asymmetry: if mirrored { asymmetry } else { 0.0 },
             centre,
             per_length: frame.scale() / step,
@@ -180,10 +183,12 @@ impl UprightBody {
             + (2.0 * high + self.asymmetry) * self.asymmetry;
         #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^30")]
         let last = self.columns as f64;
+        // Every half chord of a voxel or more is at least this long.
+        let shortest = (square - self.widest).max(1.0).sqrt();
         Circle {
             square,
             rounding,
-            slack: self.slack + rounding,
+            slack: self.slack + rounding / shortest,
             centre: self.centre,
             last,
         }
