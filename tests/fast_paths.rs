@@ -216,6 +216,25 @@ fn selection(band: Option<f64>) -> Selection {
     }
 }
 
+#[test]
+fn walls_on_lines_of_the_table_are_found() {
+    // Centres on the wall of a step, whose corner's normal is the wall's line.
+    let text = "[profiles.step]
+curves = [{ kind = 'polyline', points = [[1, 0], [4, 0], [4, 2], [3, 2], [3, 5], [2.7, 5], [2.7, 6], [1, 6], [1, 0]] }]
+[[solid]]
+kind = 'revolve'
+profile = 'step'
+";
+    let scene = scene(text);
+    for side in [1.0, 0.5, 0.25] {
+        let dims = [11.0, 11.0, 8.0].map(|d| (d / side) as usize | 1);
+        let centred = |n: usize| -0.5 * side * n as f64;
+        let origin = DVec3::new(centred(dims[0]), centred(dims[1]), -0.5 - 0.5 * side);
+        let grid = GridSpec::new(dims, origin, DVec3::splat(side)).expect("a grid");
+        compare("step", &scene, &grid);
+    }
+}
+
 /// The worst error of the stored distances as a share of what is allowed, every voxel compared.
 fn compare(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
     let sampler = LayerSampler::new(scene.assembly(), grid, selection(None));

@@ -265,9 +265,11 @@ impl Chain {
     }
 
     /// The feature nearest to a point, walking from another of the same smooth run.
+    ///
+    /// A point on the normal through a joint counts as beyond it and as short of it: on the edge of a box that a
+    /// corner's normal bounds, only the way that goes on past the joint leads to the nearest feature.
     #[inline]
     pub(crate) fn walk(&self, mut feature: u32, q: [f64; 2]) -> u32 {
-        let start = feature;
         let mut steps = self.features.len();
         while let Some(next) = self.beyond(feature, q)
             && steps > 0
@@ -275,9 +277,7 @@ impl Chain {
             feature = next;
             steps -= 1;
         }
-        if feature != start {
-            return feature;
-        }
+        let mut steps = self.features.len();
         while let Some(next) = self.short_of(feature, q)
             && steps > 0
         {
@@ -287,18 +287,18 @@ impl Chain {
         feature
     }
 
-    /// What follows a feature, where the point is beyond its end.
+    /// What follows a feature, where the point is not short of its end.
     #[inline]
     fn beyond(&self, feature: u32, q: [f64; 2]) -> Option<u32> {
         let f = &self.features[feature as usize];
-        (f.after < AXIS && dot(f.arc.to, minus(q, f.arc.end)) > 0.0).then_some(f.after)
+        (f.after < AXIS && dot(f.arc.to, minus(q, f.arc.end)) >= 0.0).then_some(f.after)
     }
 
-    /// What comes before a feature, where the point is short of its start.
+    /// What comes before a feature, where the point is not beyond its start.
     #[inline]
     fn short_of(&self, feature: u32, q: [f64; 2]) -> Option<u32> {
         let f = &self.features[feature as usize];
-        (f.before < AXIS && dot(f.arc.from, minus(q, f.arc.start)) < 0.0).then_some(f.before)
+        (f.before < AXIS && dot(f.arc.from, minus(q, f.arc.start)) <= 0.0).then_some(f.before)
     }
 
     /// A bound on what [`local`](Self::local) of a feature, nearest to some point of a box, differs by from the signed
