@@ -125,7 +125,7 @@ pub fn occupancy(scene: &Scene, grid: &GridSpec) -> Result<Volume<u8>, crate::Er
 /// let grid = scene.grid()?;
 /// let bits = voxlathe::sample::occupancy_bits(&scene, &grid)?;
 /// let bytes = voxlathe::sample::occupancy(&scene, &grid)?;
-/// assert_eq!(bits.count(), bytes.data().iter().map(|v| u64::from(*v)).sum());
+/// assert_eq!(bits.count(), bytes.data().iter().map(|v| u64::from(*v)).sum::<u64>());
 /// # Ok::<(), voxlathe::Error>(())
 /// ```
 pub fn occupancy_bits(scene: &Scene, grid: &GridSpec) -> Result<BitVolume, crate::Error> {
