@@ -122,6 +122,99 @@ const TURNS: &[(f64, f64)] = &[
     (1.0, 45.0),
 ];
 
+/// Composites of solids that do not share their axis.
+const COMPOSITES: &[(&str, &str)] = &[
+    // Upright axes side by side, faces in one plane, three terms.
+    (
+        "columns",
+        "[[solid]]
+kind = 'cylinder'
+radius = 1
+height = 1
+[[solid]]
+kind = 'cylinder'
+radius = 0.7
+height = 1
+axis = { origin = [1.2, 0.3, 0] }
+[[solid]]
+kind = 'torus'
+major = 0.5
+minor = 0.2
+axis = { origin = [0.4, -1.1, 0.5] }
+",
+    ),
+    // Bores with the ends of the drilled, one across, one upright.
+    (
+        "bored",
+        "[[solid]]
+kind = 'cylinder'
+radius = 1
+height = 1
+[[solid]]
+kind = 'cylinder'
+radius = 0.3
+height = 1
+axis = { origin = [0.5, 0, 0] }
+operation = 'subtract'
+[[solid]]
+kind = 'cylinder'
+radius = 0.2
+height = 4
+axis = { origin = [0, -2, 0.5], direction = [0, 1, 0] }
+operation = 'subtract'
+",
+    ),
+    // An intersection with a tilted axis, a wedge taken away, a sphere upon it.
+    (
+        "lens",
+        "[[solid]]
+kind = 'sphere'
+radius = 1
+[[solid]]
+kind = 'cylinder'
+radius = 0.7
+height = 3
+axis = { origin = [0.4, -0.6, -0.9], direction = [-0.3, 0.5, 0.8] }
+operation = 'intersect'
+[[solid]]
+kind = 'torus'
+major = 0.8
+minor = 0.3
+angle = 120
+start = 30
+axis = { origin = [0.1, 0.1, 0.2] }
+operation = 'subtract'
+[[solid]]
+kind = 'sphere'
+radius = 0.4
+axis = { origin = [0, 0, 0.9] }
+",
+    ),
+    // Two halves of a ring that touch in the planes of their caps.
+    (
+        "halves",
+        "[[solid]]
+kind = 'torus'
+major = 1
+minor = 0.35
+angle = 180
+[[solid]]
+kind = 'torus'
+major = 1
+minor = 0.35
+angle = 180
+start = 180
+[[solid]]
+kind = 'cylinder'
+radius = 0.5
+height = 0.35
+angle = 90
+axis = { origin = [1, 0, 0] }
+operation = 'subtract'
+",
+    ),
+];
+
 /// The one solid of each scene in less than a full turn.
 fn wedges() -> Vec<(String, String)> {
     let shell = (
@@ -294,6 +387,57 @@ fn every_voxel_is_within_the_bound() {
 }
 
 #[test]
+fn every_voxel_of_a_composite_is_within_the_bound() {
+    for (name, text) in COMPOSITES {
+        let scene = scene(text);
+        let worst = grids(&scene)
+            .iter()
+            .map(|g| compare(name, &scene, g))
+            .fold(0.0, f64::max);
+        eprintln!("{name}: worst error {worst:.3} of the bound");
+    }
+}
+
+#[test]
+fn distances_of_composites_are_as_certain_as_the_exact_ones() {
+    for (name, text) in COMPOSITES {
+        let scene = scene(text);
+        for grid in grids(&scene) {
+            let spacing = grid.spacing();
+            for band in [None, Some(2.5 * spacing.max_element())] {
+                let sampler = || LayerSampler::new(scene.assembly(), &grid, selection(band));
+                let (quick, exact) = (sampler(), sampler().with_exact_distances());
+                let [mut a, mut b] = [LayerBuffers::default(), LayerBuffers::default()];
+                for k in 0..grid.dims()[2] {
+                    quick.sample(k, &mut a);
+                    exact.sample(k, &mut b);
+                    assert_eq!(a.occupancy, b.occupancy, "{name}: layer {k}");
+                    // Of the distances at the limits any may count.
+                    let limits = [3.0 * spacing.max_element(), band.unwrap_or(f64::INFINITY)];
+                    let at = |d: f64| {
+                        limits
+                            .iter()
+                            .any(|l| (d - l).abs() < 1e-3 * spacing.min_element())
+                    };
+                    let open = b.sdf.iter().filter(|d| at(f64::from(d.abs()))).count() as u64;
+                    let (a, b) = (a.tally.certainty, b.tally.certainty);
+                    let pairs = [
+                        (a.exact, b.exact),
+                        (a.lower_bound, b.lower_bound),
+                        (a.exact_near, b.exact_near),
+                        (a.lower_bound_near, b.lower_bound_near),
+                    ];
+                    assert!(
+                        pairs.iter().all(|(a, b)| a.abs_diff(*b) <= open),
+                        "{name}: {a:?} for {b:?} in layer {k} of {grid:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn every_voxel_of_a_wedge_is_within_the_bound() {
     let mut all = 0.0_f64;
     for (n, (name, text)) in wedges().iter().enumerate() {
@@ -398,7 +542,8 @@ fn every_way_gives_the_same_bytes() {
         SimdLevel::Avx512,
         SimdLevel::Auto,
     ];
-    let upright = (SCENES.iter()).map(|(name, text)| (name.to_string(), text.to_string()));
+    let upright =
+        (SCENES.iter().chain(COMPOSITES)).map(|(name, text)| (name.to_string(), text.to_string()));
     let all = upright
         .chain(about(DIRECTIONS[0]))
         .chain(about(DIRECTIONS[1]));
@@ -435,7 +580,8 @@ fn every_way_gives_the_same_bytes() {
 
 #[test]
 fn a_band_clamps_and_changes_nothing_else() {
-    let upright = (SCENES.iter()).map(|(name, text)| (name.to_string(), text.to_string()));
+    let upright =
+        (SCENES.iter().chain(COMPOSITES)).map(|(name, text)| (name.to_string(), text.to_string()));
     let all = upright.chain(about(DIRECTIONS[0]));
     for (name, text) in all.chain(wedges().into_iter().step_by(3)) {
         let scene = scene(&text);

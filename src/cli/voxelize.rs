@@ -382,11 +382,12 @@ fn stream(
         .with_kernel(plan.kernel)
         .with_scalars(plan.scalars.clone())
         .with_cancel(&interrupted);
-    if sampler.shared_bytes().saturating_add(plan.layer_bytes) > plan.memory_limit {
+    let per_worker = |s: &LayerSampler<'_>| plan.layer_bytes.saturating_add(s.bytes_per_thread());
+    if sampler.shared_bytes().saturating_add(per_worker(&sampler)) > plan.memory_limit {
         sampler = sampler.with_exact_distances();
     }
     let left = plan.memory_limit.saturating_sub(sampler.shared_bytes());
-    let workers = plan.workers.min(workers_within(left, plan.layer_bytes));
+    let workers = (plan.workers).min(workers_within(left, per_worker(&sampler)));
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);

@@ -2,7 +2,7 @@
 //!
 //! Voxel (i, j) is bit `j nx + i` of the layer, the lowest of a word first; the bits after the last voxel are 0.
 
-use crate::math::Kernel;
+use crate::math::{Kernel, Side};
 use pulp::Arch;
 
 /// Words that hold `bits` bits.
@@ -60,10 +60,45 @@ pub(crate) fn set(words: &mut [u64], at: usize, value: bool) {
     }
 }
 
-/// The bits of bytes that are 0 or 1.
-pub(crate) fn pack(bytes: &[u8], words: &mut [u64]) {
-    for (word, bytes) in words.iter_mut().zip(bytes.chunks(64)) {
-        *word = (bytes.iter().rev()).fold(0, |w, b| w << 1 | u64::from(*b != 0));
+/// The sides of a layer's voxels from one body.
+#[derive(Debug)]
+pub(super) struct SideBits<'a> {
+    /// A bit for each voxel that is inside or on the boundary.
+    pub(super) inside: &'a mut [u64],
+    /// A bit for each of those on the boundary, where somebody asks for them. It has no words as long as there is none.
+    pub(super) on: Option<&'a mut Vec<u64>>,
+}
+
+impl SideBits<'_> {
+    /// The bits of voxels on the boundary, where they are asked for.
+    pub(super) fn on(&mut self) -> Option<&mut [u64]> {
+        let words = self.inside.len();
+        let on = self.on.as_deref_mut()?;
+        on.resize(words, 0);
+        Some(on)
+    }
+
+    /// Sets the side of one voxel.
+    pub(super) fn set(&mut self, at: usize, side: Side) {
+        set(self.inside, at, side != Side::Outside);
+        let known = self.on.as_ref().is_some_and(|on| !on.is_empty());
+        if (side == Side::On || known)
+            && let Some(on) = self.on()
+        {
+            set(on, at, side == Side::On);
+        }
+    }
+
+    /// Sets the side of voxels from `from` up to, not with, `to`, which are still outside.
+    pub(super) fn fill(&mut self, from: usize, to: usize, side: Side) {
+        if side != Side::Outside {
+            flip(self.inside, from, to);
+        }
+        if side == Side::On
+            && let Some(on) = self.on()
+        {
+            flip(on, from, to);
+        }
     }
 }
 
@@ -159,9 +194,6 @@ mod tests {
                     assert_eq!(*byte, u8::from(wanted), "{from}..{to} at {at}");
                     assert_eq!(get(&words, at), wanted);
                 }
-                let mut packed = vec![7; words.len()];
-                pack(&bytes, &mut packed);
-                assert_eq!(packed, words);
                 assert_eq!(
                     count(&words),
                     bytes.iter().map(|b| u64::from(*b)).sum::<u64>()

@@ -4,9 +4,9 @@
 //! corners are from the centre is inside or outside as a whole; others are divided, down to single voxels. Those nearer
 //! than the distance's own error are asked one by one.
 
-use super::bits;
+use super::bits::{self, SideBits};
 use super::lookup::{CHUNK, LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
-use crate::math::Kernel;
+use crate::math::{Kernel, Side};
 use crate::region::CellTable;
 
 /// Voxels along the sides of squares, and of their parts. The voxels of the last are one block of lanes.
@@ -36,14 +36,14 @@ pub(super) struct BlockLayer<'a> {
 }
 
 impl BlockLayer<'_> {
-    /// Flips, in bits that are 0, those of voxels inside; `ask` tells of a single one.
+    /// Sets, in bits that are 0, the sides of all voxels; `ask` tells of a single one.
     pub(super) fn fill(
         &self,
         kernel: Kernel,
         lanes: &mut Lanes,
         scratch: &mut BlockScratch,
-        words: &mut [u64],
-        mut ask: impl FnMut(usize, usize) -> bool,
+        sides: &mut SideBits<'_>,
+        mut ask: impl FnMut(usize, usize) -> Side,
     ) {
         let [nx, ny] = self.size.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         let BlockScratch {
@@ -85,7 +85,7 @@ impl BlockLayer<'_> {
                     } else if *value < 0.0 {
                         for row in j as usize..to_j as usize {
                             let first = row * self.size[0];
-                            bits::flip(words, first + i as usize, first + to_i as usize);
+                            bits::flip(sides.inside, first + i as usize, first + to_i as usize);
                         }
                     }
                 }
@@ -117,22 +117,29 @@ impl BlockLayer<'_> {
                     if i < nx && j < ny {
                         let at = [f64::from(i), f64::from(j)];
                         let known = look_up_ridge(self.table, self.view, at, near);
-                        let holds = known
-                            .filter(|d| d.abs() >= near)
-                            .map_or_else(|| ask(i as usize, j as usize), |d| d < 0.0);
-                        inside |= u16::from(holds) << n;
+                        let side = match known.filter(|d| d.abs() >= near) {
+                            Some(d) if d < 0.0 => Side::Inside,
+                            Some(_) => Side::Outside,
+                            None => ask(i as usize, j as usize),
+                        };
+                        inside |= u16::from(side != Side::Outside) << n;
+                        if side == Side::On
+                            && let Some(on) = sides.on()
+                        {
+                            bits::set(on, j as usize * self.size[0] + i as usize, true);
+                        }
                     }
                 }
                 let columns = (1_u64 << LAST.min(nx - i)) - 1;
                 for row in j..ny.min(j + LAST) {
                     let four = u64::from(inside >> ((row - j) * LAST)) & columns;
                     let at = row as usize * self.size[0] + i as usize;
-                    words[at / 64] ^= four << (at % 64);
+                    sides.inside[at / 64] ^= four << (at % 64);
                     if at % 64 > 64 - LAST as usize {
                         // The last bits of a layer may have no word to go on in; then there are none.
                         let rest = four >> (64 - at % 64);
                         if rest != 0 {
-                            words[at / 64 + 1] ^= rest;
+                            sides.inside[at / 64 + 1] ^= rest;
                         }
                     }
                 }

@@ -1,16 +1,15 @@
 //! One z layer of every channel.
 
-use super::bits;
+use super::bits::{self, SideBits};
+use super::body::{Asked, BodySampler, BodyScratch};
+use super::composite::{Composite, CompositeScratch, Limits};
 use super::fraction::FractionSampler;
 use super::memory::expand_past_caches;
-use super::partial::{PartialSampler, PartialScratch};
-use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
+use super::radial::{KnownLayer, Writing};
 use super::tally::{Certainty, Tally};
-use super::tilted::{TiltedSampler, TiltedScratch};
-use super::upright::{UprightBody, UprightScratch};
 use crate::grid::GridSpec;
-use crate::math::{Kernel, Side};
-use crate::solid::{Assembly, Body, Cuts, LayerCuts, Part, Reaches, Revolved, Row, Scalar, signed};
+use crate::math::Kernel;
+use crate::solid::{Assembly, Body, Part, Scalar};
 use std::sync::Arc;
 
 /// A quantity sampled on a grid.
@@ -80,24 +79,21 @@ pub type Cancel<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// Samples the layers of one grid.
 pub struct LayerSampler<'a> {
-    cancel: Option<Cancel<'a>>,
-    assembly: &'a Assembly,
-    grid: &'a GridSpec,
-    selection: Selection,
-    fractions: Option<FractionSampler>,
+    pub(super) cancel: Option<Cancel<'a>>,
+    pub(super) assembly: &'a Assembly,
+    pub(super) grid: &'a GridSpec,
+    pub(super) selection: Selection,
+    pub(super) fractions: Option<FractionSampler>,
     /// The composite's bodies, then those that only tell materials apart.
-    surfaces: Vec<Arc<Body>>,
+    pub(super) surfaces: Vec<Arc<Body>>,
     /// Surface and material of the added parts, the last first; empty where there is one material.
-    layered: Vec<(usize, u32)>,
-    scalars: Vec<Scalar>,
+    pub(super) layered: Vec<(usize, u32)>,
+    pub(super) scalars: Vec<Scalar>,
     kernel: Kernel,
-    /// The rows of the one body, where its axis is parallel to grid z.
-    upright: Option<UprightBody>,
-    /// The distances of such a body, fully turned or not.
-    radial: Option<RadialSampler>,
-    partial: Option<PartialSampler>,
-    /// Both of the one body that is turned about another axis.
-    tilted: Option<TiltedSampler>,
+    /// The bodies of the assembly.
+    bodies: Vec<BodySampler>,
+    /// The one that the assembly is, where it is one.
+    single: Option<usize>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -114,24 +110,8 @@ impl std::fmt::Debug for LayerSampler<'_> {
 pub(super) struct LayerScratch {
     /// A bit for each voxel that is inside.
     inside: Vec<u64>,
-    upright: UprightScratch,
-    radial: RadialScratch,
-    partial: PartialScratch,
-    tilted: TiltedScratch,
-}
-
-/// What is left to the rows.
-struct Rest {
-    occupancy: bool,
-    sdf: bool,
-}
-
-/// What one thread reuses from row to row.
-struct Scratch {
-    /// For each surface, the sides of the row's voxels.
-    sides: Vec<Vec<Side>>,
-    cuts: Cuts,
-    reaches: Reaches,
+    body: BodyScratch,
+    composite: CompositeScratch,
 }
 
 /// Surfaces that tell the materials of a composite apart: those of its bodies and, where parts
@@ -164,10 +144,8 @@ impl<'a> LayerSampler<'a> {
         } else {
             (assembly.bodies().to_vec(), Vec::new())
         };
-        let body = assembly.single().and_then(Body::revolved);
-        let upright = body.and_then(|b| UprightBody::new(b, grid));
-        let radial = body.filter(|_| selection.sdf && upright.is_some());
-        let tilted = body.filter(|b| !b.rows().is_upright());
+        let bodies = assembly.bodies().iter();
+        let bodies = bodies.map(|b| BodySampler::new(b, grid, selection.sdf));
         Self {
             cancel: None,
             assembly,
@@ -178,10 +156,8 @@ impl<'a> LayerSampler<'a> {
             layered,
             scalars: Vec::new(),
             kernel: Kernel::default(),
-            upright,
-            radial: radial.and_then(|b| RadialSampler::new(b, grid)),
-            partial: radial.and_then(|b| PartialSampler::new(b, grid)),
-            tilted: tilted.and_then(|b| TiltedSampler::new(b, grid)),
+            bodies: bodies.collect(),
+            single: assembly.single_index(),
         }
     }
 
@@ -194,10 +170,9 @@ impl<'a> LayerSampler<'a> {
     /// A sampler that asks the exact path for every distance: slower, and within one ulp of it.
     #[must_use]
     pub fn with_exact_distances(self) -> Self {
+        let bodies = self.bodies.into_iter();
         Self {
-            radial: None,
-            partial: None,
-            tilted: None,
+            bodies: bodies.map(BodySampler::with_exact_distances).collect(),
             ..self
         }
     }
@@ -233,9 +208,20 @@ impl<'a> LayerSampler<'a> {
     /// [`with_exact_distances`](Self::with_exact_distances) does without.
     #[must_use]
     pub fn shared_bytes(&self) -> u64 {
-        let full = self.radial.as_ref().map_or(0, RadialSampler::bytes);
-        full + self.partial.as_ref().map_or(0, PartialSampler::bytes)
-            + self.tilted.as_ref().map_or(0, TiltedSampler::bytes)
+        self.bodies.iter().map(BodySampler::bytes).sum()
+    }
+
+    /// Bytes that each thread takes beside [`bytes_per_layer`](Self::bytes_per_layer): the sides and distances of the
+    /// bodies of a composite.
+    #[must_use]
+    pub fn bytes_per_thread(&self) -> u64 {
+        if self.single.is_some() {
+            return 0;
+        }
+        let distances = if self.fills_distance() { 4 * 8 } else { 0 };
+        // Two bits for the side, and a distance.
+        let bits = (2 + distances) * self.bodies.len() as u64;
+        self.grid.layer_len() as u64 * bits / 8
     }
 
     /// Fills `out` with layer `k`.
@@ -262,167 +248,101 @@ impl<'a> LayerSampler<'a> {
         out.tally = Tally::default();
 
         let mut scratch = std::mem::take(&mut out.scratch);
-        let fast = self.layer_bits(k, &mut scratch);
-        if fast {
-            out.inside = bits::count(&scratch.inside);
-            bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
-        }
-        let measured =
-            fast && self.selection.sdf && self.radial_layer(k, &mut scratch, &mut out.sdf, false);
+        self.find_sides(k, &mut scratch);
+        out.inside = bits::count(&scratch.inside);
+        bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
+        let measured = self.selection.sdf && self.fills_distance();
         if measured {
-            self.count_exact(&out.sdf, &mut out.tally.certainty);
+            self.find_distances(k, &mut scratch, &mut out.sdf, false);
+            self.count_certainty(k, &mut scratch, &out.sdf, &mut out.tally.certainty);
         }
         out.scratch = scratch;
-        let rest = Rest {
-            occupancy: !fast,
-            sdf: self.selection.sdf && !measured,
-        };
-        self.rows(k, &rest, out);
+        self.rows(k, self.selection.sdf && !measured, out);
     }
 
-    /// What the rows of a layer still need.
-    fn rows(&self, k: usize, rest: &Rest, out: &mut LayerBuffers) {
-        let [nx, ny, _] = self.grid.dims();
-        let sides = rest.occupancy
-            || rest.sdf
-            || self.fractions.is_some()
-            || self.selection.material && !self.layered.is_empty();
-        if !(sides || self.selection.material || !self.scalars.is_empty()) {
-            return;
-        }
-        let band = self.selection.band.unwrap_or(f64::INFINITY);
-        let mut scratch = Scratch {
-            sides: vec![vec![Side::Outside; nx]; self.surfaces.len()],
-            cuts: Cuts::default(),
-            reaches: Reaches::new(self.assembly, band),
-        };
-        let corner = self.grid.centre(0, 0, k);
-        let surfaces = self.surfaces.iter();
-        let layers: Vec<LayerCuts> = surfaces.map(|s| s.layer(corner)).collect();
-        for j in 0..ny {
-            if self.cancel.is_some_and(|cancel| cancel()) {
-                return;
-            }
-            if sides {
-                self.side_row(j, k, &layers, &mut scratch);
-            }
-            let range = j * nx..(j + 1) * nx;
-            let occupancy = &mut out.occupancy[range.clone()];
-            if rest.occupancy {
-                self.occupancy_row(j, k, &scratch.sides, occupancy);
-                out.inside += occupancy.iter().map(|&o| u64::from(o)).sum::<u64>();
-            }
-            if self.selection.material {
-                let material = &mut out.material[range.clone()];
-                self.material_row(j, k, &scratch.sides, occupancy, material);
-                out.tally.count_materials(material);
-            }
-            if !self.scalars.is_empty() {
-                self.scalar_row([j, k], occupancy, &mut out.scalars);
-            }
-            if rest.sdf {
-                let sdf = &mut out.sdf[range.clone()];
-                self.distance_row(j, k, &mut scratch, occupancy, sdf, &mut out.tally.certainty);
-            }
-            if let Some(fractions) = &self.fractions {
-                out.fraction_sum += fractions.row(
-                    self.assembly,
-                    self.grid,
-                    [j, k],
-                    &scratch.sides,
-                    &mut out.fraction[range],
-                );
-            }
-        }
-    }
-
-    /// The one body that rows are taken from in whole layers.
-    fn upright_body(&self) -> Option<(&Revolved, &UprightBody)> {
-        Some((self.assembly.single()?.revolved()?, self.upright.as_ref()?))
-    }
-
-    /// The one body that is turned about an axis of its own.
-    fn tilted_body(&self) -> Option<(&Revolved, &TiltedSampler)> {
-        Some((self.assembly.single()?.revolved()?, self.tilted.as_ref()?))
-    }
-
-    /// The bits of layer `k`, where they are found in whole layers.
-    fn layer_bits(&self, k: usize, scratch: &mut LayerScratch) -> bool {
-        if !self.fills_occupancy() {
-            return false;
-        }
+    /// Finds which voxels of layer `k` are inside.
+    fn find_sides(&self, k: usize, scratch: &mut LayerScratch) {
         let LayerScratch {
             inside,
-            upright: own,
-            tilted: turned,
-            ..
+            body,
+            composite,
         } = scratch;
         inside.clear();
         inside.resize(bits::words_for(self.grid.layer_len()), 0);
-        if let Some((body, upright)) = self.upright_body() {
-            upright.layer(self.kernel, body, self.grid, k, own, inside);
-        } else if let Some((body, tilted)) = self.tilted_body() {
-            tilted.bits(self.kernel, body, self.grid, k, turned, inside);
+        if let Some(single) = self.single {
+            let mut sides = SideBits { inside, on: None };
+            self.bodies[single].sides(self.grid, self.asked(k), body, &mut sides);
+        } else {
+            self.composite().sides(self.asked(k), composite, inside);
         }
-        true
     }
 
-    /// The distances of layer `k` from its bits, where a table holds them.
-    fn radial_layer(
+    /// Finds the distances of layer `k`, whose sides are known, where [`fills_distance`](Self::fills_distance) says so.
+    fn find_distances(
         &self,
         k: usize,
         scratch: &mut LayerScratch,
         out: &mut [f32],
         past_caches: bool,
-    ) -> bool {
+    ) {
         let writing = Writing {
             kernel: self.kernel,
             cancel: self.cancel,
-            band: self.selection.band.unwrap_or(f64::INFINITY),
+            band: self.band(),
             past_caches,
         };
         let LayerScratch {
             inside,
-            radial: own,
-            partial: own_partial,
-            tilted: turned,
-            ..
+            body,
+            composite,
         } = scratch;
         let known = KnownLayer { k, inside };
-        if let Some((body, tilted)) = self.tilted_body() {
-            tilted.layer(body, self.grid, k, writing, turned, out);
-            return true;
-        }
-        let Some((body, _)) = self.upright_body() else {
-            return false;
-        };
-        if let Some(radial) = &self.radial {
-            radial.layer(body, self.grid, known, writing, own, out);
-        } else if let Some(partial) = &self.partial {
-            partial.layer(body, self.grid, known, writing, own_partial, out);
+        if let Some(single) = self.single {
+            self.bodies[single].distances(self.grid, known, writing, body, out);
         } else {
-            return false;
+            self.composite().distances(known, writing, composite, out);
         }
-        true
     }
 
-    /// Counts distances that are all exact.
-    fn count_exact(&self, sdf: &[f32], certainty: &mut Certainty) {
-        let band = stored(self.selection.band.unwrap_or(f64::INFINITY));
-        let near = stored(3.0 * self.grid.spacing().max_element());
-        let (mut all, mut close) = (0, 0);
-        for values in sdf.chunks(1 << 16) {
-            let (mut a, mut c) = (0_u32, 0_u32);
-            for value in values {
-                let within = value.abs() < band;
-                a += u32::from(within);
-                c += u32::from(within & (value.abs() <= near));
-            }
-            all += u64::from(a);
-            close += u64::from(c);
+    /// Counts how exact the distances of layer `k` are, which were just found.
+    fn count_certainty(
+        &self,
+        k: usize,
+        scratch: &mut LayerScratch,
+        sdf: &[f32],
+        certainty: &mut Certainty,
+    ) {
+        let limits = Limits {
+            band: stored(self.band()),
+            near: stored(3.0 * self.grid.spacing().max_element()),
+        };
+        if self.single.is_some() {
+            count_exact(limits, sdf, certainty);
+        } else {
+            let composite = &mut scratch.composite;
+            (self.composite()).count_certainty(self.asked(k), limits, composite, sdf, certainty);
         }
-        certainty.exact += all;
-        certainty.exact_near += close;
+    }
+
+    fn composite(&self) -> Composite<'_> {
+        Composite {
+            assembly: self.assembly,
+            bodies: &self.bodies,
+            grid: self.grid,
+        }
+    }
+
+    fn asked(&self, k: usize) -> Asked<'_> {
+        Asked {
+            k,
+            kernel: self.kernel,
+            cancel: self.cancel,
+        }
+    }
+
+    /// Distances are clamped to ± this.
+    pub(super) fn band(&self) -> f64 {
+        self.selection.band.unwrap_or(f64::INFINITY)
     }
 
     /// The grid that is sampled.
@@ -437,147 +357,51 @@ impl<'a> LayerSampler<'a> {
         &self.selection
     }
 
-    /// Whether [`occupancy_into`](Self::occupancy_into) serves.
-    pub(super) fn fills_occupancy(&self) -> bool {
-        self.upright.is_some() || self.tilted.is_some()
-    }
-
     /// Whether [`distance_into`](Self::distance_into) serves.
     pub(super) fn fills_distance(&self) -> bool {
-        self.radial.is_some() || self.partial.is_some() || self.tilted.is_some()
+        match self.single {
+            Some(single) => self.bodies[single].has_distances(),
+            None => !self.assembly.is_empty() && self.bodies.iter().all(BodySampler::has_distances),
+        }
     }
 
     /// Fills one layer of occupancy in a large buffer.
     pub(super) fn occupancy_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u8]) {
-        if self.layer_bits(k, scratch) {
-            expand_past_caches(self.kernel, &scratch.inside, out);
-        }
+        self.find_sides(k, scratch);
+        expand_past_caches(self.kernel, &scratch.inside, out);
     }
 
     /// Fills one layer of occupancy as bits.
-    pub(super) fn bits_into(&self, k: usize, buffers: &mut LayerBuffers, out: &mut [u64]) {
-        if self.layer_bits(k, &mut buffers.scratch) {
-            out.copy_from_slice(&buffers.scratch.inside);
-        } else {
-            self.sample(k, buffers);
-            bits::pack(&buffers.occupancy, out);
-        }
+    pub(super) fn bits_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u64]) {
+        self.find_sides(k, scratch);
+        out.copy_from_slice(&scratch.inside);
     }
 
     /// Fills one layer of distances in a large buffer.
     pub(super) fn distance_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [f32]) {
-        // About a tilted axis the distances tell the sides.
-        if self.tilted.is_some() || self.layer_bits(k, scratch) {
-            self.radial_layer(k, scratch, out, true);
+        let single = self.single.map(|single| &self.bodies[single]);
+        if single.is_none_or(BodySampler::distances_need_sides) {
+            self.find_sides(k, scratch);
         }
+        self.find_distances(k, scratch, out, true);
     }
+}
 
-    /// Finds the sides of the voxels of row (j, k).
-    fn side_row(&self, j: usize, k: usize, layers: &[LayerCuts], scratch: &mut Scratch) {
-        let first = self.grid.centre(0, j, k);
-        let row = Row {
-            first,
-            step: self.grid.spacing().x,
-            count: self.grid.dims()[0],
-        };
-        for ((body, layer), sides) in self.surfaces.iter().zip(layers).zip(&mut scratch.sides) {
-            let b = body.bounds();
-            let margin = 1e-9 * b.longest_side() + 64.0 * f64::EPSILON * first.abs().max_element();
-            let misses = |c: usize| first[c] < b.min[c] - margin || first[c] > b.max[c] + margin;
-            if misses(1) || misses(2) {
-                sides.fill(Side::Outside);
-                continue;
-            }
-            body.cuts(layer, &row, &mut scratch.cuts);
-            scratch.cuts.runs(|from, to| {
-                let middle = self.grid.centre(from + (to - from) / 2, j, k);
-                sides[from..=to].fill(body.side(middle));
-            });
+/// Counts distances that are all exact.
+fn count_exact(Limits { band, near }: Limits, sdf: &[f32], certainty: &mut Certainty) {
+    let (mut all, mut close) = (0, 0);
+    for values in sdf.chunks(1 << 16) {
+        let (mut a, mut c) = (0_u32, 0_u32);
+        for value in values {
+            let within = value.abs() < band;
+            a += u32::from(within);
+            c += u32::from(within & (value.abs() <= near));
         }
+        all += u64::from(a);
+        close += u64::from(c);
     }
-
-    fn occupancy_row(&self, j: usize, k: usize, sides: &[Vec<Side>], out: &mut [u8]) {
-        for (i, occupied) in out.iter_mut().enumerate() {
-            let inside = self
-                .assembly
-                .holds(|b| sides[b][i], || self.grid.centre(i, j, k));
-            *occupied = u8::from(inside);
-        }
-    }
-
-    fn material_row(
-        &self,
-        j: usize,
-        k: usize,
-        sides: &[Vec<Side>],
-        occupancy: &[u8],
-        out: &mut [u32],
-    ) {
-        let only = self.assembly.parts()[0].material();
-        for (i, material) in out.iter_mut().enumerate() {
-            *material = if occupancy[i] == 0 {
-                0
-            } else if self.layered.is_empty() {
-                only
-            } else {
-                let mut layers = self.layered.iter();
-                let top = layers.find(|(s, _)| sides[*s][i] != Side::Outside);
-                top.map_or_else(
-                    || self.assembly.material_inside(self.grid.centre(i, j, k)),
-                    |&(_, m)| m,
-                )
-            };
-        }
-    }
-
-    fn scalar_row(&self, [j, k]: [usize; 2], occupancy: &[u8], out: &mut [Vec<f32>]) {
-        let first = j * occupancy.len();
-        for (i, _) in occupancy.iter().enumerate().filter(|(_, o)| **o != 0) {
-            let point = self.grid.centre(i, j, k);
-            let Some((volume, from)) = self.assembly.preimage(point) else {
-                continue;
-            };
-            for (scalar, values) in self.scalars.iter().zip(out.iter_mut()) {
-                #[allow(
-                    clippy::cast_possible_truncation,
-                    reason = "stored voxels are f32; parameters and fields are below 1e100"
-                )]
-                {
-                    values[first + i] = (volume.scalar(scalar, &from))
-                        .clamp(f64::from(f32::MIN), f64::from(f32::MAX))
-                        as f32;
-                }
-            }
-        }
-    }
-
-    fn distance_row(
-        &self,
-        j: usize,
-        k: usize,
-        scratch: &mut Scratch,
-        occupancy: &[u8],
-        out: &mut [f32],
-        certainty: &mut Certainty,
-    ) {
-        let spacing = self.grid.spacing();
-        let band = self.selection.band.unwrap_or(f64::INFINITY);
-        let near = 3.0 * spacing.max_element();
-        let Scratch { sides, reaches, .. } = scratch;
-        reaches.reset();
-        for (i, value) in out.iter_mut().enumerate() {
-            let point = self.grid.centre(i, j, k);
-            let (side, inside) = (|b: usize| sides[b][i], occupancy[i] != 0);
-            let measured = self.assembly.measure_distance(point, side, inside, reaches);
-            *value = stored(signed(measured.distance, inside).clamp(-band, band));
-            reaches.moved(spacing.x);
-            // A clamped value says only how far the surface is at least.
-            if measured.distance < band {
-                let exact = self.assembly.is_exact(point, side, inside, measured);
-                certainty.count(exact, measured.distance <= near);
-            }
-        }
-    }
+    certainty.exact += all;
+    certainty.exact_near += close;
 }
 
 /// The stored form of a signed distance: nearest f32, but never across zero.

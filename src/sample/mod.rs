@@ -20,7 +20,9 @@
 
 mod bits;
 mod blocks;
+mod body;
 mod caps;
+mod composite;
 mod divided;
 mod fraction;
 mod layer;
@@ -31,6 +33,7 @@ mod partial;
 mod plane;
 mod queue;
 mod radial;
+mod rows;
 mod spread;
 mod tally;
 mod tilted;

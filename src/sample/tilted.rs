@@ -18,6 +18,7 @@
 //!   is of a number below 3 steps, 2e-7 of them; what the distance lost at the centre is kept to 5e-8. That stays below
 //!   what is said as long as a step is the least spacing; where it is more, by the tolerance of the cells.
 
+use super::bits::SideBits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
@@ -165,15 +166,15 @@ impl TiltedSampler {
         }
     }
 
-    /// Flips, in bits that are 0, those of layer `k`'s voxels inside the body.
-    pub(super) fn bits(
+    /// Sets, in bits that are 0, the sides of layer `k`'s voxels.
+    pub(super) fn sides(
         &self,
         kernel: Kernel,
         body: &Revolved,
         grid: &GridSpec,
         k: usize,
         scratch: &mut TiltedScratch,
-        words: &mut [u64],
+        sides: &mut SideBits<'_>,
     ) {
         let [nx, ny, _] = grid.dims();
         let spacing = grid.spacing();
@@ -185,8 +186,8 @@ impl TiltedSampler {
             near: self.near,
         };
         let TiltedScratch { lanes, blocks, .. } = scratch;
-        layer.fill(kernel, lanes, blocks, words, |i, j| {
-            body.contains(grid.centre(i, j, k))
+        layer.fill(kernel, lanes, blocks, sides, |i, j| {
+            body.side(grid.centre(i, j, k))
         });
     }
 

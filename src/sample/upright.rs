@@ -12,7 +12,7 @@
 //! so are the few of a row that the circle only touches. A row and the one that mirrors it have the same ends. A
 //! wedge is the same in all layers and is kept as bits.
 
-use super::bits;
+use super::bits::{self, SideBits};
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real, Side};
 use crate::solid::{Cuts, LayerCuts, Revolved, Ring, Row, Turn};
@@ -35,7 +35,15 @@ pub(super) struct UprightBody {
     slack: f64,
     columns: usize,
     rows: usize,
-    wedge: Option<Vec<u64>>,
+    wedge: Option<Wedge>,
+}
+
+/// The voxels of any layer that a body's wedge holds.
+#[derive(Debug)]
+struct Wedge {
+    inside: Vec<u64>,
+    /// Those on a plane of a cap; no words where there is none.
+    on: Vec<u64>,
 }
 
 /// What one thread reuses.
@@ -90,12 +98,12 @@ impl UprightBody {
             rows: ny,
             wedge: match body.turn() {
                 Turn::Full => None,
-                Turn::Partial(_) => Some(wedge_bits(body, grid)),
+                Turn::Partial(_) => Some(Wedge::new(body, grid)),
             },
         })
     }
 
-    /// Flips, in bits that are 0, those of layer `k`'s voxels inside the body.
+    /// Sets, in bits that are 0, the sides of layer `k`'s voxels.
     pub(super) fn layer(
         &self,
         kernel: Kernel,
@@ -103,7 +111,7 @@ impl UprightBody {
         grid: &GridSpec,
         k: usize,
         scratch: &mut UprightScratch,
-        words: &mut [u64],
+        sides: &mut SideBits<'_>,
     ) {
         let rows = body.rows();
         let LayerCuts::Radii(radii) = rows.layer(grid.centre(0, 0, k)) else {
@@ -112,12 +120,16 @@ impl UprightBody {
         let rings = rows.rings(&radii, grid.centre(0, 0, k));
         let mut doubtful = Vec::new();
         for (n, ring) in rings.iter().enumerate() {
-            let beyond = rings.get(n + 1).is_some_and(|r| r.side != Side::Outside);
-            let changes = (ring.side != Side::Outside) != beyond;
+            let beyond = rings.get(n + 1).map_or(Side::Outside, |r| r.side);
             let circle = self.circle(ring);
             let any_open = self.ends(kernel, &circle, scratch);
-            if changes {
-                self.flip(scratch, words);
+            if (ring.side == Side::Outside) != (beyond == Side::Outside) {
+                self.flip(scratch, sides.inside);
+            }
+            if (ring.side == Side::On) != (beyond == Side::On)
+                && let Some(on) = sides.on()
+            {
+                self.flip(scratch, on);
             }
             if any_open {
                 for (j, _) in scratch.open.iter().enumerate().filter(|(_, o)| **o != 0) {
@@ -127,13 +139,10 @@ impl UprightBody {
             }
         }
         if let Some(wedge) = &self.wedge {
-            for (word, mask) in words.iter_mut().zip(wedge) {
-                *word &= mask;
-            }
+            wedge.narrow(sides);
         }
         for [i, j] in doubtful {
-            let inside = body.contains(grid.centre(i, j, k));
-            bits::set(words, j * self.columns + i, inside);
+            sides.set(j * self.columns + i, body.side(grid.centre(i, j, k)));
         }
     }
 
@@ -288,25 +297,48 @@ fn place(v: f64, last: f64) -> i32 {
     (v.max(0.0).min(last) + LOW_BITS).to_bits() as i32
 }
 
-/// The voxels of any layer that a body's wedge holds.
-fn wedge_bits(body: &Revolved, grid: &GridSpec) -> Vec<u64> {
-    let [nx, ny, _] = grid.dims();
-    let mut words = vec![0; bits::words_for(nx * ny)];
-    let mut cuts = Cuts::default();
-    for j in 0..ny {
-        let row = Row {
-            first: grid.centre(0, j, 0),
-            step: grid.spacing().x,
-            count: nx,
+impl Wedge {
+    fn new(body: &Revolved, grid: &GridSpec) -> Self {
+        let [nx, ny, _] = grid.dims();
+        let (mut inside, mut on) = (vec![0; bits::words_for(nx * ny)], Vec::new());
+        let mut sides = SideBits {
+            inside: &mut inside,
+            on: Some(&mut on),
         };
-        cuts.reset(nx);
-        body.rows().wedge_cuts(&row, &mut cuts);
-        cuts.runs(|from, to| {
-            let middle = grid.centre(from + (to - from) / 2, j, 0);
-            if body.wedge_side(middle) != Side::Outside {
-                bits::flip(&mut words, j * nx + from, j * nx + to + 1);
-            }
-        });
+        let mut cuts = Cuts::default();
+        for j in 0..ny {
+            let row = Row {
+                first: grid.centre(0, j, 0),
+                step: grid.spacing().x,
+                count: nx,
+            };
+            cuts.reset(nx);
+            body.rows().wedge_cuts(&row, &mut cuts);
+            cuts.runs(|from, to| {
+                let middle = grid.centre(from + (to - from) / 2, j, 0);
+                sides.fill(j * nx + from, j * nx + to + 1, body.wedge_side(middle));
+            });
+        }
+        Self { inside, on }
     }
-    words
+
+    /// Leaves of a full turn's sides those of the wedge.
+    fn narrow(&self, sides: &mut SideBits<'_>) {
+        if !self.on.is_empty()
+            && let Some(on) = sides.on()
+        {
+            for (word, own) in on.iter_mut().zip(&self.on) {
+                *word |= own;
+            }
+        }
+        for (word, own) in sides.inside.iter_mut().zip(&self.inside) {
+            *word &= own;
+        }
+        if let Some(on) = &mut sides.on {
+            // None where nobody was on the boundary so far.
+            for (word, inside) in on.iter_mut().zip(&*sides.inside) {
+                *word &= inside;
+            }
+        }
+    }
 }

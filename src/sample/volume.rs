@@ -50,10 +50,6 @@ impl LayerSampler<'_> {
     /// When `out` does not have one value for each voxel.
     pub fn fill_occupancy(&self, out: &mut [u8]) {
         self.check_length(out.len());
-        if !self.fills_occupancy() {
-            self.layers_into(out, |b| &b.occupancy);
-            return;
-        }
         let layers = out.par_chunks_mut(self.grid().layer_len()).enumerate();
         layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
             self.occupancy_into(k, scratch, layer);
@@ -72,8 +68,8 @@ impl LayerSampler<'_> {
             "whole layers of words"
         );
         let layers = out.par_chunks_mut(per_layer).enumerate();
-        layers.for_each_init(LayerBuffers::default, |buffers, (k, layer)| {
-            self.bits_into(k, buffers, layer);
+        layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
+            self.bits_into(k, scratch, layer);
         });
     }
 

@@ -117,9 +117,14 @@ impl Assembly {
     /// The one body that the composite is, where it is one.
     #[must_use]
     pub fn single(&self) -> Option<&Body> {
+        self.single_index().map(|b| &*self.bodies[b])
+    }
+
+    /// Its index.
+    pub(crate) fn single_index(&self) -> Option<usize> {
         match self.terms.as_slice() {
             [Term { factors }] => match factors.as_slice() {
-                [one] if !one.complement => Some(&self.bodies[one.body]),
+                [one] if !one.complement => Some(one.body),
                 _ => None,
             },
             _ => None,

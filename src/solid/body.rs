@@ -119,6 +119,14 @@ impl Body {
         }
     }
 
+    /// Whether a row comes near the solid's bounds, seen along x.
+    pub(crate) fn is_near_row(&self, row: &Row) -> bool {
+        let b = self.bounds();
+        let far = row.first.abs().max_element();
+        let margin = 1e-9 * b.longest_side() + 64.0 * f64::EPSILON * far;
+        (1..3).all(|c| row.first[c] >= b.min[c] - margin && row.first[c] <= b.max[c] + margin)
+    }
+
     /// Collects where the membership may change along a row.
     pub(crate) fn cuts(&self, layer: &LayerCuts, row: &Row, cuts: &mut Cuts) {
         cuts.reset(row.count);

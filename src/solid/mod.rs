@@ -40,7 +40,7 @@ pub use patches::{Field, Patches, Scalar};
 pub use revolved::Revolved;
 pub use turn::Turn;
 
-pub(crate) use assembly::{Reaches, signed};
+pub(crate) use assembly::{Measured, Reaches, signed};
 pub(crate) use body::VoxelShape;
 pub(crate) use fraction::TOLERANCE;
 pub(crate) use row::{Cuts, LayerCuts, Ring, Row};
