@@ -1,7 +1,7 @@
 //! The signed distance along one height, as cubics in r.
 //!
-//! Every cell of a [`MeridianField`]'s lattice gets the cubic that has the distance and its slope at both ends.
-//! Where one feature answers for the whole cell the error of that is
+//! A stretch of cells of a [`MeridianField`]'s lattice gets the cubic that has the distance and its slope at both ends,
+//! each cell its part of it. Where one feature answers for the whole stretch, of length h, the error of that is
 //!
 //! ```text
 //!   |error| <= h⁴ / 384 · max |d⁗|,    |d⁗| <= 3 b³    b the bend, 1 / distance from the centre of curvature
@@ -9,9 +9,9 @@
 //!
 //! and where features hand over within it, each jump J of the second derivative adds at most `h² J / 60` and each
 //! jump K of the third at most `h³ K / 192` (the Peano kernel of cubic Hermite interpolation, a clamped beam, and
-//! its slope). Cells that may err by more than the tolerance, and those where the distance is not smooth, have NaN
-//! as their first coefficient and are [`mended`](RadialTable::mended) voxel by voxel: where a ridge between smooth
-//! stretches of the boundary crosses the cell, from the cubics of those.
+//! its slope). Stretches that may err by more than the tolerance are halved. Single cells that may, and those where
+//! the distance is not smooth, have NaN as their first coefficient and are [`mended`](RadialTable::mended) voxel by
+//! voxel: where a ridge between smooth stretches of the boundary crosses the cell, from the cubics of those.
 //!
 //! Source of d⁗: `d = ρ - R` with ρ the distance from the centre, differentiated along a line: `d″ = b τ²`,
 //! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
@@ -54,7 +54,9 @@ pub(crate) const UNUSED: f32 = 1e30;
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
 const SAME_BEND: f64 = 1e-9;
-/// Largest bend times cell side for which the bounds' variation over the cell is accounted.
+/// The most cells that one cubic serves.
+const WIDEST: usize = 16;
+/// Largest bend times length for which the bounds' variation over the cell is accounted.
 const BENT: f64 = 0.25;
 
 impl RadialTable {
@@ -81,41 +83,40 @@ impl RadialTable {
         tolerance: f64,
     ) {
         let (columns, first) = field.columns();
-        self.groups.clear();
-        self.groups
-            .resize(columns / GROUP + PADDING, [[0.0; GROUP]; 5]);
+        let groups = columns / GROUP + PADDING;
+        // What is left of the last height is overwritten, or not read where a cell has no cubic.
+        self.groups.resize(groups, [[0.0; GROUP]; 5]);
+        self.groups[columns / GROUP..].fill([[0.0; GROUP]; 5]);
         (0..start).for_each(|k| self.settle(k, UNUSED));
-        self.leaves.clear();
         self.leaves.resize(columns, 0);
-        self.ridges.clear();
         self.ridges.resize(columns, [0; 2]);
         self.cubics.clear();
         self.kernel = kernel;
         self.height = z;
         self.scale = scale;
-        let cell = field.cell();
-        #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
-        let node = |k: usize| (first + k as i64) as f64 * cell;
+        let row = Row {
+            field,
+            z,
+            tolerance,
+            first,
+        };
         field.leaves_at(z, &mut |from, to, number| {
             let from = from.max(start);
             if from >= to {
                 return;
             }
             self.leaves[from..to].fill(number);
-            let leaf = field.leaf(number);
-            let features = field.features(leaf);
-            match (leaf.is_smooth(), features.len()) {
-                (false, _) => (from..to).for_each(|k| self.leave_open(k)),
-                (true, 1) => {
-                    let mut near = Foot::new(field, features[0], [node(from), z]);
-                    for k in from..to {
-                        let far = Foot::new(field, near.feature, [node(k + 1), z]);
-                        let good = error(field, [&near, &far], [node(k + 1), z]) <= tolerance;
-                        self.put(k, good, [&near.local, &far.local], cell * scale);
-                        near = far;
-                    }
-                }
-                (true, _) => self.ridge(field, (from, to), z, features, tolerance, &node),
+            let features = field.features(field.leaf(number));
+            if features.is_empty() {
+                (from..to).for_each(|k| self.leave_open(k));
+                return;
+            }
+            let mut near = row.feet(features.iter().copied(), from);
+            for start in (from..to).step_by(WIDEST) {
+                let end = to.min(start + WIDEST);
+                let far = row.feet(near.iter().map(|f| f.feature), end);
+                self.span(&row, [start, end], &near, &far);
+                near = far;
             }
         });
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
@@ -153,80 +154,41 @@ impl RadialTable {
 
     fn leave_open(&mut self, cell: usize) {
         self.groups[cell / GROUP][0][cell % GROUP] = f32::NAN;
+        self.ridges[cell] = [0; 2];
     }
 
-    /// Tabulates a leaf of several runs.
-    fn ridge(
-        &mut self,
-        field: &MeridianField,
-        (from, to): (usize, usize),
-        z: f64,
-        runs: &[u32],
-        tolerance: f64,
-        node: &impl Fn(usize) -> f64,
-    ) {
-        let h = field.cell();
-        let at = |starts: &[Foot], k: usize| -> Feet {
-            let q = [node(k), z];
-            starts
-                .iter()
-                .map(|f| Foot::new(field, f.feature, q))
-                .collect()
-        };
-        let mut near: Feet = (runs.iter().map(|&f| Foot::new(field, f, [node(from), z]))).collect();
-        for k in from..to {
-            let far = at(&near, k + 1);
-            let size = |f: &Foot| f.local.value.abs();
-            let nearest = |feet: &Feet| {
-                (0..feet.len()).fold(0, |m, i| {
-                    if size(&feet[i]) < size(&feet[m]) {
-                        i
-                    } else {
-                        m
-                    }
-                })
-            };
-            let first = nearest(&near);
-            // The differences to the others are linear but for the bends, where no other surface is crossed: they
-            // keep their sign where they have it at both ends by more than those. What the arcs err by is added:
-            // the sign of the distance is that of the surface that is nearer, not of its arc.
-            let q = [node(k + 1), z];
-            let passages: smallvec::SmallVec<[Option<Passage>; MOST_RUNS]> = (0..near.len())
-                .map(|i| Passage::new(field, [&near[i], &far[i]], q))
-                .collect();
-            let bend = |i: usize| passages[i].as_ref().map_or(f64::INFINITY, |p| p.bend);
-            let own = bend(first);
-            let rivals = (0..near.len()).filter(|&i| {
-                let gap = |feet: &Feet| size(&feet[i]) - size(&feet[first]);
-                let bent = h * (bend(i) + own);
-                let clear = near[i].local.value * far[i].local.value > 0.0
-                    && bent <= BENT
-                    && gap(&near).min(gap(&far)) > 0.25 * h * bent + field.chain().margin();
-                i == first || !clear
-            });
-            let rivals: smallvec::SmallVec<[usize; MOST_RUNS]> = rivals.collect();
-            let good = rivals
-                .iter()
-                .all(|&i| (passages[i].as_ref()).is_some_and(|p| p.error(h) <= tolerance));
-            if good && rivals.len() > 1 {
+    /// Tabulates cells of one leaf from what its runs know at both ends: by one cubic where that is within the
+    /// tolerance, else half by half.
+    fn span(&mut self, row: &Row<'_>, [from, to]: [usize; 2], near: &Feet, far: &Feet) {
+        let count = to - from;
+        let rivals = row.rivals([near, far], [from, to]);
+        if let Some(&[first]) = rivals.as_deref() {
+            self.put(
+                row.field,
+                [from, to],
+                [&near[first].local, &far[first].local],
+            );
+        } else if count > 1 {
+            let middle = from + count / 2;
+            let feet = row.feet(near.iter().map(|f| f.feature), middle);
+            self.span(row, [from, middle], near, &feet);
+            self.span(row, [middle, to], &feet, far);
+        } else {
+            self.leave_open(from);
+            if let Some(rivals) = rivals {
                 // The distance is the least of theirs, and each is within the tolerance.
                 let start = u32::try_from(self.cubics.len()).unwrap_or(u32::MAX);
-                let length = h * self.scale;
-                let cubics = rivals
-                    .iter()
-                    .map(|&i| self.cubic([&near[i].local, &far[i].local], length));
-                let cubics: smallvec::SmallVec<[[f64; 4]; MOST_RUNS]> = cubics.collect();
-                self.ridges[k] = [start, u32::try_from(cubics.len()).unwrap_or(0)];
-                self.cubics.extend(cubics);
+                let length = row.field.cell() * self.scale;
+                for &i in &rivals {
+                    let cubic = self.cubic([&near[i].local, &far[i].local], length);
+                    self.cubics.push(cubic);
+                }
+                self.ridges[from] = [start, u32::try_from(rivals.len()).unwrap_or(0)];
             }
-            let (a, b) = (&near[first], &far[first]);
-            let good = good && rivals.len() == 1;
-            self.put(k, good, [&a.local, &b.local], h * self.scale);
-            near = far;
         }
     }
 
-    /// The cubic over a cell of `length`, in scene units, from what its ends know.
+    /// The cubic over a stretch of `length`, in scene units, from what its ends know.
     #[inline]
     fn cubic(&self, [near, far]: [&Local; 2], length: f64) -> [f64; 4] {
         let (a, b) = (near.value * self.scale, far.value * self.scale);
@@ -235,20 +197,30 @@ impl RadialTable {
         [a, da, 3.0 * rise - 2.0 * da - db, da + db - 2.0 * rise]
     }
 
+    /// Gives cells their parts of one cubic.
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "coefficients are f32: the stored voxels are"
+        clippy::cast_precision_loss,
+        reason = "coefficients are f32: the stored voxels are; counts are small"
     )]
-    fn put(&mut self, k: usize, good: bool, ends: [&Local; 2], length: f64) {
-        if !good {
-            self.leave_open(k);
-            return;
-        }
-        let [a, b, c, d] = self.cubic(ends, length);
-        let lost = a - f64::from(a as f32);
-        let group = &mut self.groups[k / GROUP];
-        for (row, v) in group.iter_mut().zip([a, b, c, d, lost]) {
-            row[k % GROUP] = v as f32;
+    fn put(&mut self, field: &MeridianField, [from, to]: [usize; 2], ends: [&Local; 2]) {
+        let count = (to - from) as f64;
+        let [a, b, c, d] = self.cubic(ends, count * field.cell() * self.scale);
+        let part = 1.0 / count;
+        for k in from..to {
+            let t = (k - from) as f64 * part;
+            let value = a + t * (b + t * (c + t * d));
+            let coefficients = [
+                value,
+                part * (b + t * (2.0 * c + 3.0 * t * d)),
+                part * part * (c + 3.0 * t * d),
+                part * part * part * d,
+                value - f64::from(value as f32),
+            ];
+            let group = &mut self.groups[k / GROUP];
+            for (row, v) in group.iter_mut().zip(coefficients) {
+                row[k % GROUP] = v as f32;
+            }
         }
     }
 
@@ -276,6 +248,9 @@ struct Foot {
 
 type Feet = smallvec::SmallVec<[Foot; MOST_RUNS]>;
 
+/// Numbers of runs.
+type Rivals = smallvec::SmallVec<[usize; MOST_RUNS]>;
+
 impl Foot {
     #[inline]
     fn new(field: &MeridianField, from: u32, q: [f64; 2]) -> Self {
@@ -284,6 +259,66 @@ impl Foot {
             feature,
             local: field.chain().local(feature, q),
         }
+    }
+}
+
+/// One height of a field.
+struct Row<'a> {
+    field: &'a MeridianField,
+    z: f64,
+    tolerance: f64,
+    /// The first cell, counted from r = 0.
+    first: i64,
+}
+
+impl Row<'_> {
+    #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+    fn node(&self, k: usize) -> [f64; 2] {
+        let r = (self.first + k as i64) as f64 * self.field.cell();
+        [r, self.z]
+    }
+
+    /// The feet of node `k`, from those of another point of the leaf.
+    fn feet(&self, runs: impl Iterator<Item = u32>, k: usize) -> Feet {
+        let q = self.node(k);
+        runs.map(|from| Foot::new(self.field, from, q)).collect()
+    }
+
+    /// The runs that may be nearest between two nodes; `None` where the cubic of one of them may err by more than the
+    /// tolerance.
+    ///
+    /// The differences to the others are linear but for the bends, where no other surface is crossed: they keep their
+    /// sign where they have it at both ends by more than those. What the arcs err by is added: the sign of the distance
+    /// is that of the surface that is nearer, not of its arc.
+    fn rivals(&self, [near, far]: [&Feet; 2], [from, to]: [usize; 2]) -> Option<Rivals> {
+        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+        let h = (to - from) as f64 * self.field.cell();
+        let q = self.node(to);
+        let size = |f: &Foot| f.local.value.abs();
+        let passages: smallvec::SmallVec<[Option<Passage>; MOST_RUNS]> = (near.iter().zip(far))
+            .map(|(a, b)| Passage::new(self.field, [a, b], q, h))
+            .collect();
+        let first = (1..near.len()).fold(0, |m, i| {
+            if size(&near[i]) < size(&near[m]) {
+                i
+            } else {
+                m
+            }
+        });
+        let bend = |i: usize| passages[i].as_ref().map_or(f64::INFINITY, |p| p.bend);
+        let own = bend(first);
+        let rivals = (0..near.len()).filter(|&i| {
+            let gap = |feet: &Feet| size(&feet[i]) - size(&feet[first]);
+            let bent = h * (bend(i) + own);
+            let clear = near[i].local.value * far[i].local.value > 0.0
+                && bent <= BENT
+                && gap(near).min(gap(far)) > 0.25 * h * bent + self.field.chain().margin();
+            i == first || !clear
+        });
+        let rivals: Rivals = rivals.collect();
+        let good =
+            |i: &usize| (passages[*i].as_ref()).is_some_and(|p| p.error(h) <= self.tolerance);
+        rivals.iter().all(good).then_some(rivals)
     }
 }
 
@@ -296,9 +331,10 @@ struct Passage {
 }
 
 impl Passage {
-    /// From one foot to the next, which is that of `q`; `None` where more features are passed than are followed.
+    /// From one foot to the next, which is that of `q`, on a stretch of length `h`; `None` where more features are
+    /// passed than are followed.
     #[inline]
-    fn new(field: &MeridianField, [near, far]: [&Foot; 2], q: [f64; 2]) -> Option<Self> {
+    fn new(field: &MeridianField, [near, far]: [&Foot; 2], q: [f64; 2], h: f64) -> Option<Self> {
         let mut found = Self {
             bend: near.local.bend.abs().max(far.local.bend.abs()),
             jumps: [0.0; 2],
@@ -306,7 +342,7 @@ impl Passage {
         if near.feature == far.feature {
             return Some(found);
         }
-        let (h, chain) = (field.cell(), field.chain());
+        let chain = field.chain();
         let (mut feature, mut last) = (near.feature, chain.local(near.feature, q).bend);
         for _ in 0..MOST_JOINTS {
             feature = chain.towards(feature, far.feature)?;
@@ -329,25 +365,19 @@ impl Passage {
         None
     }
 
-    /// A bound on the error of the cubic over a cell of side `h`.
+    /// A bound on the error of the cubic over a stretch of length `h`.
     fn error(&self, h: f64) -> f64 {
         let [second, third] = self.jumps;
         smooth_error(h, self.bend) + h * h * second / 60.0 + h.powi(3) * third / 192.0
     }
 }
 
-/// A bound on the error of one cell's cubic, whose far end is `q`.
-#[inline]
-fn error(field: &MeridianField, feet: [&Foot; 2], q: [f64; 2]) -> f64 {
-    Passage::new(field, feet, q).map_or(f64::INFINITY, |p| p.error(field.cell()))
-}
-
-/// The error over a cell of side `h` where the bend at its ends is at most `bend`.
+/// The error over a stretch of length `h` where the bend at its ends is at most `bend`.
 fn smooth_error(h: f64, bend: f64) -> f64 {
     if bend * h > BENT {
         return f64::INFINITY;
     }
-    // The centre of curvature may be nearer by the cell's side.
+    // The centre of curvature may be nearer by the stretch's length.
     let b = bend / (1.0 - bend * h);
     (h * b).powi(3) * h / 128.0
 }

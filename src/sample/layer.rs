@@ -227,19 +227,15 @@ impl<'a> LayerSampler<'a> {
     /// Fills `out` with layer `k`.
     pub fn sample(&self, k: usize, out: &mut LayerBuffers) {
         let n = self.grid.layer_len();
-        out.occupancy.clear();
+        let wanted = |on: bool| if on { n } else { 0 };
+        // Every value is written: what is left of the last layer need not be cleared.
         out.occupancy.resize(n, 0);
-        let resized = |v: &mut Vec<f32>, on: bool| {
-            v.clear();
-            v.resize(if on { n } else { 0 }, 0.0);
-        };
-        resized(&mut out.fraction, self.selection.fraction);
-        resized(&mut out.sdf, self.selection.sdf);
-        out.material.clear();
-        out.material
-            .resize(if self.selection.material { n } else { 0 }, 0);
+        out.fraction.resize(wanted(self.selection.fraction), 0.0);
+        out.sdf.resize(wanted(self.selection.sdf), 0.0);
+        out.material.resize(wanted(self.selection.material), 0);
         out.scalars.resize(self.scalars.len(), Vec::new());
         for values in &mut out.scalars {
+            // But for those of voxels outside.
             values.clear();
             values.resize(n, 0.0);
         }

@@ -1,21 +1,23 @@
 //! Where a solid meets a grid: layers of occupancy, volume fraction, signed distance and material.
 //!
-//! The unit of work is a z layer. Its rows are filled in runs between the cuts of
-//! [`crate::solid`], so that one point test serves a whole run; distances and fractions follow row
-//! by row. Layers do not depend on each other: any number of threads gives the same values.
-//!
-//! One body with an axis parallel to grid z goes a quicker way, to the same membership and to distances within
-//! max(2 ulp, 1e-4 of the least spacing); so does one that is turned fully about any other axis:
+//! The unit of work is a z layer. Layers do not depend on each other: any number of threads gives the same values.
+//! Each body has the quickest way that its turn and its axis allow, to the same membership and to distances within
+//! max(2 ulp, 1e-4 of the least spacing); composites combine those of their bodies. What has no such way, and
+//! fractions, materials and scalars, goes row by row, where one point test serves a whole run between the cuts of
+//! [`crate::solid`].
 //!
 //! ```text
-//!   upright   rings of a layer ──> ends of all rows ──> bits, 64 voxels a word ──> bytes
-//!   plane     radii of a layer's voxels, once for the grid
-//!   radial    a table of cubics over the radii of a layer ──spread──> rows
-//!   partial   the same for less than a full turn, with a second table along its caps
-//!   lookup    distances from a table of cells, for rows and points of a layer
-//!   blocks    squares of a layer, divided where the surface is near ──> bits
-//!   tilted    ties these to a body and its table
-//!   memory    stores past the caches, large pages
+//!   upright     rings of a layer ──> ends of all rows ──> bits, 64 voxels a word ──> bytes
+//!   plane       radii of a layer's voxels, once for the grid
+//!   radial      a table of cubics over the radii of a layer ──spread──> rows
+//!   partial     the same for less than a full turn, with a second table along its caps
+//!   lookup      distances from a table of cells, for rows and points of a layer
+//!   blocks      squares of a layer, divided where the surface is near ──> bits
+//!   tilted      ties these to a body and its table
+//!   body        the way of one body
+//!   composite   bits and distances of several
+//!   rows        the rest
+//!   memory      stores past the caches, large pages
 //! ```
 
 mod bits;

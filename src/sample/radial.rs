@@ -58,6 +58,43 @@ pub(super) struct RadialScratch {
     doubts: Vec<u8>,
     /// Voxels of those rows whose sign the exact path tells.
     close: Vec<[usize; 2]>,
+    known: Known,
+}
+
+/// Distances of this layer that were mended: voxels share their radius with at least one other, where x and y are
+/// alike.
+#[derive(Debug)]
+struct Known {
+    /// Radius and distance, at the place that the radius gives.
+    entries: Vec<(u32, f64)>,
+}
+
+/// No radius of a voxel.
+const NO_RADIUS: u32 = u32::MAX;
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            entries: vec![(NO_RADIUS, 0.0); 512],
+        }
+    }
+}
+
+impl Known {
+    fn clear(&mut self) {
+        self.entries.fill((NO_RADIUS, 0.0));
+    }
+
+    /// The distance at a radius, which `find` tells where it is not known.
+    fn distance(&mut self, radius: u32, find: impl FnOnce() -> f64) -> f64 {
+        let mixed = radius.wrapping_mul(0x9e37_79b9);
+        let at = (mixed >> 16) as usize % self.entries.len();
+        let entry = &mut self.entries[at];
+        if entry.0 != radius {
+            *entry = (radius, find());
+        }
+        entry.1
+    }
 }
 
 /// A layer whose membership is known.
@@ -139,6 +176,7 @@ impl RadialSampler {
             .table
             .fill(kernel, &self.field, z, frame.scale(), self.tolerance);
         scratch.close.clear();
+        scratch.known.clear();
         let (columns, padded) = self.plane.stored();
         let rows = self.plane.len();
         let mut first = 0;
@@ -165,6 +203,7 @@ impl RadialSampler {
                     inside,
                     row: [j, nx],
                     close: &mut scratch.close,
+                    known: &mut scratch.known,
                 };
                 self.mend(mend, marks, part);
                 if band.is_finite() {
@@ -246,8 +285,10 @@ impl RadialSampler {
                 }
                 if part[i].is_nan() {
                     let radius = self.plane.radii(j..j + 1).radii[i];
-                    let r = f64::from(radius) * self.field.cell() / super::plane::PLACES;
-                    let distance = (at.table).mended(&self.field, (radius >> 16) as usize, r);
+                    let distance = at.known.distance(radius, || {
+                        let r = f64::from(radius) * self.field.cell() / super::plane::PLACES;
+                        (at.table).mended(&self.field, (radius >> 16) as usize, r)
+                    });
                     let side = bits::get(at.inside, j * nx + i);
                     part[i] = stored(signed(distance, side));
                 }
@@ -267,6 +308,7 @@ struct Mend<'a> {
     /// The row, and how many voxels it has.
     row: [usize; 2],
     close: &'a mut Vec<[usize; 2]>,
+    known: &'a mut Known,
 }
 
 /// Clamps values to ± `band`.
