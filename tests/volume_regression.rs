@@ -109,22 +109,40 @@ fn a_gap_that_a_profile_closes_is_closed_in_its_volume() {
 }
 
 #[test]
-fn blocks_that_overlap_keep_the_faces_they_share_on_one_side() {
-    let both = scene(&patches(&[
-        block([0.0; 3], [1.0; 3]),
-        block([0.0; 3], [2.0, 1.0, 1.0]),
-    ]));
-    assert_eq!(both.bounds().min.to_array(), [0.0; 3]);
-    assert_eq!(both.bounds().max.to_array(), [2.0, 1.0, 1.0]);
-    assert!(both.assembly().contains(DVec3::splat(0.5)));
-    assert_eq!(distance(&both, [0.25, 0.5, 0.5]), -0.25);
-    let twice = scene(&patches(&[
-        block([0.0; 3], [1.0; 3]),
-        block([0.0; 3], [1.0; 3]),
-    ]));
-    assert_eq!(distance(&twice, [0.25, 0.5, 0.5]), -0.25);
-    assert_eq!(distance(&twice, [-0.25, 0.5, 0.5]), 0.25);
-    assert!(twice.warnings()[0].contains("patches 0 and 1 overlap"));
+fn blocks_that_overlap_are_refused_whatever_faces_they_share() {
+    for second in [[2.0, 1.0, 1.0], [1.0; 3], [0.5, 1.0, 1.0]] {
+        let said = refused(&patches(&[
+            block([0.0; 3], [1.0; 3]),
+            block([0.0; 3], second),
+        ]));
+        assert!(
+            said.contains("patches 0 and 1, which both hold ["),
+            "{said}"
+        );
+        assert!(said.contains("solids of its own"), "{said}");
+    }
+}
+
+#[test]
+fn flat_faces_of_rational_patches_bound_exactly() {
+    // A quarter of a ring between z = 0 and z = 1.5, and one from 1 on.
+    let s = std::f64::consts::FRAC_1_SQRT_2;
+    for z in [0.0, 1.0] {
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        for height in [z, z + 1.5] {
+            for [x, y, w] in [[1.0, 0.0, 1.0], [1.0, 1.0, s], [0.0, 1.0, 1.0]] {
+                for r in [1.0, 2.0] {
+                    points.push([r * x, r * y, height]);
+                    weights.push(w);
+                }
+            }
+        }
+        let ring = scene(&patches(&[format!(
+            "{{ degrees = [1, 2, 1], knots = [[0, 0, 1, 1], [0, 0, 0, 1, 1, 1], [0, 0, 1, 1]], points = {points:?}, weights = {weights:?} }}"
+        )]));
+        assert_eq!(ring.bounds().min.to_array(), [0.0, 0.0, z]);
+        assert_eq!(ring.bounds().max.to_array(), [2.0, 2.0, z + 1.5]);
+    }
 }
 
 /// A patch of degree 1, 1, `z.len() - 1` over the unit square.
@@ -430,7 +448,7 @@ fn scalars_are_given_on_the_faces_too() {
 }
 
 #[test]
-fn a_patch_that_overlaps_itself_is_told_of() {
+fn a_patch_that_overlaps_itself_is_refused() {
     // A ring of rectangular section that goes round one and a quarter times, rising not at all.
     let s = std::f64::consts::FRAC_1_SQRT_2;
     let ring = |quarters: usize| {
@@ -448,18 +466,14 @@ fn a_patch_that_overlaps_itself_is_told_of() {
         let mut knots = vec![0.0; 3];
         knots.extend((1..quarters).flat_map(|i| [i as f64; 2]));
         knots.extend(vec![quarters as f64; 3]);
-        scene(&patches(&[format!(
+        patches(&[format!(
             "{{ degrees = [1, 1, 2], knots = [[0, 0, 1, 1], [0, 0, 1, 1], {knots:?}], points = {points:?}, weights = {weights:?} }}"
-        )]))
+        )])
     };
-    let said = ring(5);
-    assert!(
-        said.warnings().len() == 1 && said.warnings()[0].contains("patch 0 overlaps itself"),
-        "{:?}",
-        said.warnings()
-    );
-    assert!(ring(3).warnings().is_empty());
-    assert!(ring(4).warnings().is_empty());
+    let said = refused(&ring(5));
+    assert!(said.contains("patch 0, which overlaps itself"), "{said}");
+    assert!(scene(&ring(3)).warnings().is_empty());
+    assert!(scene(&ring(4)).warnings().is_empty());
 }
 
 #[test]

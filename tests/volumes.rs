@@ -323,7 +323,7 @@ fn shared_faces_are_no_boundary() {
 }
 
 #[test]
-fn patches_that_overlap_are_told_of() {
+fn patches_that_overlap_are_refused() {
     let cube = |x: f64| {
         let corner = |n: u32| {
             [
@@ -338,18 +338,23 @@ fn patches_that_overlap_are_told_of() {
         )
     };
     let pair = |x: f64| {
-        scene(&format!(
-            "[[solid]]\nkind = 'volume'\npatches = [{}, {}]",
+        format!(
+            "schema = 1\n[[solid]]\nkind = 'volume'\npatches = [{}, {}]",
             cube(0.0),
             cube(x)
-        ))
+        )
     };
-    assert!(pair(1.0).warnings().is_empty());
-    let said = pair(0.25);
     assert!(
-        said.warnings()[0].contains("patches 0 and 1 overlap"),
-        "{:?}",
-        said.warnings()
+        scene(&pair(1.0).replace("schema = 1\n", ""))
+            .warnings()
+            .is_empty()
+    );
+    let said = Scene::parse(&pair(0.25))
+        .expect_err("patches that overlap")
+        .to_string();
+    assert!(
+        said.contains("patches 0 and 1, which both hold ["),
+        "{said}"
     );
 }
 

@@ -106,7 +106,7 @@ fn read_object(scan: &mut Scanner<'_>, reading: &mut Reading) -> Result<(), Exch
         let of = format!("of {}", parameter(direction));
         let count = scan.count(&format!("the number of control points {of}"), 1)?;
         let here = scan.here();
-        let order = scan.count(&format!("the order {of}, which is degree + 1,"), 1)?;
+        let order = scan.count(&format!("the order {of}, which is degree + 1"), 1)?;
         let length = count.saturating_add(order);
         let values = scan.numbers(length, |i| format!("knot {i} {of}"))?;
         let name = format!("knot vector {of}");

@@ -227,6 +227,14 @@ fn read_weights(
             wanted: format!("{points}, one for each point"),
         });
     }
+    // Named as the file has them: its order is not ours.
+    if let Some(i) = weights.iter().position(|w| !(*w > 0.0 && w.is_finite())) {
+        return Err(ExchangeError::Unexpected {
+            place: net.place(&format!("weights[{i}]")),
+            found: weights[i].to_string(),
+            wanted: "a weight, finite and greater than zero".into(),
+        });
+    }
     if rational == Some(false) && weights.iter().any(|&w| w != 1.0) {
         return Err(ExchangeError::Unsupported {
             place: net.place("weights"),

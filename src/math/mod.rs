@@ -10,11 +10,13 @@ pub mod tetrahedra;
 pub mod tolerance;
 
 mod aabb;
+mod root;
 mod side;
 mod simd;
 
 pub use aabb::Aabb;
 pub use dd::{Dd, Real};
+pub(crate) use root::root;
 pub use side::Side;
 #[cfg(test)]
 pub(crate) use simd::every_kernel;

@@ -103,7 +103,8 @@ impl BodySampler {
 
     /// Whether [`distances`](Self::distances) rests on the layer's sides.
     pub(super) fn distances_need_sides(&self) -> bool {
-        !matches!(self.way, Way::Tilted(_))
+        let partial = |d: &UprightDistances| matches!(d, UprightDistances::Partial(_));
+        matches!(&self.way, Way::Upright { distances: Some(d), .. } if partial(d))
     }
 
     /// Bytes that all threads share.
@@ -179,7 +180,7 @@ impl BodySampler {
         match &self.way {
             Way::Upright { distances, .. } => match distances {
                 Some(UprightDistances::Full(one)) => {
-                    one.layer(body, grid, known, writing, &mut scratch.radial, out);
+                    one.layer(body, grid, known.k, writing, &mut scratch.radial, out);
                 }
                 Some(UprightDistances::Partial(one)) => {
                     one.layer(body, grid, known, writing, &mut scratch.partial, out);

@@ -18,7 +18,7 @@
 
 use super::plane::{BLOCK, PLACES, REACH, SCATTERED};
 use crate::grid::GridSpec;
-use crate::math::{Dd, Kernel, Real};
+use crate::math::{Dd, Kernel, Real, root};
 use crate::solid::Revolved;
 
 /// Voxels that are decided on together.
@@ -400,7 +400,7 @@ impl pulp::NullaryFnOnce for CapGroups<'_> {
 fn cap(row: CapRow, x: f64, edge: f32) -> [f32; 2] {
     let across = larger(row.across, x);
     let edge = f64::from(if edge < 0.0 { 0.0 } else { edge });
-    [across as f32, (across * across + edge * edge).sqrt() as f32]
+    [across as f32, root(across * across + edge * edge) as f32]
 }
 
 /// The lesser of the distances to the swept surface and to the cap, in the wedge, and that to the cap outside it.

@@ -27,6 +27,7 @@ mod caps;
 mod composite;
 mod divided;
 mod fraction;
+mod known;
 mod layer;
 mod lookup;
 mod memory;

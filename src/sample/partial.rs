@@ -27,6 +27,7 @@ use super::bits;
 use super::caps::{
     CapGroups, CapPlane, CapRow, GROUP, Given, Places, SweptGroups, combined, dispatch,
 };
+use super::known::Known;
 use super::layer::stored;
 use super::plane::{BLOCK, PLACES, Plane, Radii};
 use super::queue::RowQueue;
@@ -77,6 +78,9 @@ pub(super) struct PartialScratch {
     row: Vec<f32>,
     own: RowScratch,
     queue: RowQueue,
+    /// Values of either table that were mended.
+    known_swept: Known,
+    known_edges: Known,
 }
 
 /// What a row of voxels takes.
@@ -179,7 +183,11 @@ impl PartialSampler {
             row,
             own,
             queue,
+            known_swept,
+            known_edges,
         } = scratch;
+        known_swept.clear();
+        known_edges.clear();
         let layer = Layer {
             body,
             grid,
@@ -200,10 +208,11 @@ impl PartialSampler {
             if writing.cancel.is_some_and(|cancel| cancel()) {
                 return;
             }
-            self.swept_row(&layer, self.plane.radii(n..n + 1), distances, marks);
+            let row_marks = (&mut *marks, &mut *known_swept);
+            self.swept_row(&layer, self.plane.radii(n..n + 1), distances, row_marks);
             let twin = self.plane.twin(n);
             for (j, is_twin) in std::iter::once((n, false)).chain(twin.map(|t| (t, true))) {
-                self.row(&layer, j, &distances[..padded], own, row);
+                self.row(&layer, j, &distances[..padded], (own, known_edges), row);
                 if !writing.past_caches {
                     out[j * nx..(j + 1) * nx].copy_from_slice(&row[..nx]);
                 } else if is_twin {
@@ -287,7 +296,7 @@ impl PartialSampler {
         layer: &Layer<'_>,
         radii: Radii<'_>,
         distances: &mut [f32],
-        marks: &mut Vec<u8>,
+        (marks, known): (&mut Vec<u8>, &mut Known),
     ) {
         let (columns, padded) = self.plane.stored();
         let nx = layer.grid.dims()[0];
@@ -309,9 +318,11 @@ impl PartialSampler {
                 let i = block * BLOCK + marks.trailing_zeros() as usize;
                 marks &= marks - 1;
                 if i < columns {
-                    let (column, r) = (radii.radii[i] >> 16, f64::from(radii.radii[i]) * per_place);
-                    let distance = layer.swept.mended(&self.swept, column as usize, r);
-                    distances[i] = stored(distance);
+                    let place = radii.radii[i];
+                    distances[i] = known.value(place, || {
+                        let (column, r) = (place >> 16, f64::from(place) * per_place);
+                        stored(layer.swept.mended(&self.swept, column as usize, r))
+                    });
                 }
             }
         }
@@ -327,7 +338,7 @@ impl PartialSampler {
         layer: &Layer<'_>,
         j: usize,
         distances: &[f32],
-        scratch: &mut RowScratch,
+        (scratch, known): (&mut RowScratch, &mut Known),
         out: &mut [f32],
     ) {
         let nx = layer.grid.dims()[0];
@@ -384,7 +395,8 @@ impl PartialSampler {
         for g in (0..groups).filter(|g| scratch.doubts[*g]) {
             for i in g * GROUP..((g + 1) * GROUP).min(nx) {
                 if !(out[i].abs() >= given.least) {
-                    out[i] = self.mended(layer, [i, j], row, distances[i], out[i]);
+                    let found = (distances[i], out[i]);
+                    out[i] = self.mended(layer, [i, j], row, found, known);
                 }
             }
         }
@@ -438,20 +450,23 @@ impl PartialSampler {
         );
     }
 
-    /// The value of a voxel whose value from the tables is `found`: not a number, or too near to 0.
+    /// The value of a voxel from its distance from the swept surface, and from the value that the tables found: not a
+    /// number, or too near to 0.
     fn mended(
         &self,
         layer: &Layer<'_>,
         [i, j]: [usize; 2],
         row: CapRow,
-        swept: f32,
-        found: f32,
+        (swept, found): (f32, f32),
+        known_edges: &mut Known,
     ) -> f32 {
         let (grid, known) = (layer.grid, layer.known);
         let inside = bits::get(known.inside, j * grid.dims()[0] + i);
         let value = if found.is_nan() {
             let x = self.caps.x()[i];
-            combined(row, x, swept, self.edge(layer, row, x))
+            let place = row.place(x);
+            let edge = known_edges.value(place, || self.edge(layer, place));
+            combined(row, x, swept, edge)
         } else {
             0.0
         };
@@ -466,9 +481,8 @@ impl PartialSampler {
     }
 
     /// Distance to the section in the cap's plane, 0 in it, at a place where the table has none.
-    fn edge(&self, layer: &Layer<'_>, row: CapRow, x: f64) -> f32 {
+    fn edge(&self, layer: &Layer<'_>, place: u32) -> f32 {
         // The column as the lanes saw it.
-        let place = row.place(x);
         let column = (place >> 16) as usize;
         #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
         let along = (f64::from(place) / PLACES + self.edges.columns().1 as f64) * self.edges.cell();

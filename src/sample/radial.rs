@@ -12,16 +12,16 @@
 //! The shares are bounds, proved in [`crate::region`] and [`super::plane`]; the sum stays within
 //! max(2 ulp, 1e-4 of the least spacing).
 
-use super::bits;
+use super::known::Known;
 use super::layer::{Cancel, stored};
 use super::memory::{self, write_past_caches};
 use super::mirror::{MirroredRows, Parts};
-use super::plane::{BLOCK, Plane};
+use super::plane::{BLOCK, PLACES, Plane};
 use super::spread::spread;
 use crate::grid::GridSpec;
-use crate::math::{Dd, Kernel, Real};
+use crate::math::{Dd, Kernel, Real, Side};
 use crate::region::{Chain, Extent, MeridianField, RadialTable};
-use crate::solid::{Revolved, Turn, signed};
+use crate::solid::{LayerCuts, Revolved, Ring, Turn, signed};
 use std::ops::Range;
 
 /// Shares of the least spacing.
@@ -58,43 +58,8 @@ pub(super) struct RadialScratch {
     doubts: Vec<u8>,
     /// Voxels of those rows whose sign the exact path tells.
     close: Vec<[usize; 2]>,
+    /// Values that were mended.
     known: Known,
-}
-
-/// Distances of this layer that were mended: voxels share their radius with at least one other, where x and y are
-/// alike.
-#[derive(Debug)]
-struct Known {
-    /// Radius and distance, at the place that the radius gives.
-    entries: Vec<(u32, f64)>,
-}
-
-/// No radius of a voxel.
-const NO_RADIUS: u32 = u32::MAX;
-
-impl Default for Known {
-    fn default() -> Self {
-        Self {
-            entries: vec![(NO_RADIUS, 0.0); 512],
-        }
-    }
-}
-
-impl Known {
-    fn clear(&mut self) {
-        self.entries.fill((NO_RADIUS, 0.0));
-    }
-
-    /// The distance at a radius, which `find` tells where it is not known.
-    fn distance(&mut self, radius: u32, find: impl FnOnce() -> f64) -> f64 {
-        let mixed = radius.wrapping_mul(0x9e37_79b9);
-        let at = (mixed >> 16) as usize % self.entries.len();
-        let entry = &mut self.entries[at];
-        if entry.0 != radius {
-            *entry = (radius, find());
-        }
-        entry.1
-    }
 }
 
 /// A layer whose membership is known.
@@ -162,13 +127,12 @@ impl RadialSampler {
         &self,
         body: &Revolved,
         grid: &GridSpec,
-        known: KnownLayer<'_>,
+        k: usize,
         writing: Writing<'_>,
         scratch: &mut RadialScratch,
         out: &mut [f32],
     ) {
         let Writing { kernel, band, .. } = writing;
-        let KnownLayer { k, inside } = known;
         let nx = grid.dims()[0];
         let frame = body.frame();
         let z = frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
@@ -177,6 +141,7 @@ impl RadialSampler {
             .fill(kernel, &self.field, z, frame.scale(), self.tolerance);
         scratch.close.clear();
         scratch.known.clear();
+        let rings = rings(body, grid, k);
         let (columns, padded) = self.plane.stored();
         let rows = self.plane.len();
         let mut first = 0;
@@ -200,8 +165,8 @@ impl RadialSampler {
                 let part = &mut scratch.parts[at * padded..at * padded + columns];
                 let mend = Mend {
                     table: &scratch.table,
-                    inside,
-                    row: [j, nx],
+                    rings: &rings,
+                    row: j,
                     close: &mut scratch.close,
                     known: &mut scratch.known,
                 };
@@ -217,9 +182,10 @@ impl RadialSampler {
                 }
                 for j in std::iter::once(j).chain(self.plane.twin(j)) {
                     for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
-                        let side = bits::get(inside, j * nx + i);
-                        let distance = body.distance(grid.centre(i, j, k), side, band);
-                        out[j * nx + i] = stored(signed(distance, side).clamp(-band, band));
+                        let point = grid.centre(i, j, k);
+                        let inside = body.contains(point);
+                        let distance = body.distance(point, inside, band);
+                        out[j * nx + i] = stored(signed(distance, inside).clamp(-band, band));
                     }
                 }
             }
@@ -269,7 +235,7 @@ impl RadialSampler {
 
     /// Fills in what the table left open of a row's stored part.
     fn mend(&self, at: Mend<'_>, marks: &[u8], part: &mut [f32]) {
-        let [j, nx] = at.row;
+        let j = at.row;
         let (words, rest) = marks.as_chunks::<8>();
         let last = (
             words.len(),
@@ -285,12 +251,14 @@ impl RadialSampler {
                 }
                 if part[i].is_nan() {
                     let radius = self.plane.radii(j..j + 1).radii[i];
-                    let distance = at.known.distance(radius, || {
-                        let r = f64::from(radius) * self.field.cell() / super::plane::PLACES;
-                        (at.table).mended(&self.field, (radius >> 16) as usize, r)
+                    part[i] = at.known.value(radius, || {
+                        let r = f64::from(radius) * self.field.cell() / PLACES;
+                        let distance = (at.table).mended(&self.field, (radius >> 16) as usize, r);
+                        // Those for which the ring is in question are near the surface.
+                        let ring = at.rings.iter().find(|ring| r <= ring.radius[1]);
+                        let inside = ring.is_some_and(|ring| ring.side != Side::Outside);
+                        stored(signed(distance, inside))
                     });
-                    let side = bits::get(at.inside, j * nx + i);
-                    part[i] = stored(signed(distance, side));
                 }
                 if !(part[i].abs() >= self.near) {
                     at.close.push([i, j]);
@@ -303,12 +271,19 @@ impl RadialSampler {
 /// What a row is mended from.
 struct Mend<'a> {
     table: &'a RadialTable,
-    /// A bit for each voxel of the layer that is inside.
-    inside: &'a [u64],
-    /// The row, and how many voxels it has.
-    row: [usize; 2],
+    rings: &'a [Ring],
+    row: usize,
     close: &'a mut Vec<[usize; 2]>,
     known: &'a mut Known,
+}
+
+/// The rings of layer `k`.
+fn rings(body: &Revolved, grid: &GridSpec, k: usize) -> Vec<Ring> {
+    let point = grid.centre(0, 0, k);
+    match body.rows().layer(point) {
+        LayerCuts::Radii(radii) => body.rows().rings(&radii, point),
+        LayerCuts::Search => Vec::new(),
+    }
 }
 
 /// Clamps values to ± `band`.

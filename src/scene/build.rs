@@ -116,16 +116,17 @@ impl Scene {
                         && let Some(([first, later], [x, y, z])) =
                             patches.overlap().map(|(pair, at)| (pair, at.to_array()))
                     {
-                        let what = if first == later {
-                            format!(
-                                "patch {first} overlaps itself, at [{x}, {y}, {z}] for one: what is held twice is measured twice, and bounded in between; split it over solids of their own"
-                            )
+                        let place = format!("both hold [{x}, {y}, {z}]");
+                        let found = if first == later {
+                            format!("patch {first}, which overlaps itself: parts of it {place}")
                         } else {
-                            format!(
-                                "patches {first} and {later} overlap, at [{x}, {y}, {z}] for one: each is measured and bounded by itself; make them solids of their own"
-                            )
+                            format!("patches {first} and {later}, which {place}")
                         };
-                        warnings.push(format!("{}: {what}", solid.path));
+                        let wanted =
+                            "patches that touch at most; what overlaps goes into solids of its own";
+                        let fault =
+                            model.error(solid.place, &solid.path, Some(found), wanted, None);
+                        return Err(fault.into());
                     }
                     part
                 }

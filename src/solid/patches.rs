@@ -80,6 +80,21 @@ pub(crate) struct Nets {
     turned: Option<(Region, Turn)>,
 }
 
+impl Nets {
+    /// How far the control points, and so the solid, reach in a direction along an axis, exactly; infinite in any other.
+    fn hull(&self, direction: DVec3) -> f64 {
+        let along = direction.to_array();
+        let Some(k) = (0..3).find(|&k| along[k].abs() == 1.0) else {
+            return f64::INFINITY;
+        };
+        if (0..3).any(|i| i != k && along[i] != 0.0) {
+            return f64::INFINITY;
+        }
+        let points = self.volumes.iter().flat_map(|v| v.control_points());
+        points.fold(f64::NEG_INFINITY, |m, p| m.max(p[k] * along[k]))
+    }
+}
+
 /// The image of one or several trivariate NURBS.
 #[derive(Debug, Clone)]
 pub struct Patches {
@@ -162,7 +177,9 @@ impl Patches {
         let extent = |k: usize, sign: f64| {
             // A world direction in local coordinates.
             let direction = DVec3::from_array([0, 1, 2].map(|i| frame.axis(i)[k])) * sign;
-            let reach = frame.scale_exact() * Dd::of(nets.faces.support(direction) * sign);
+            // Rounding takes a flat face beyond its points; where the axes agree those are exact.
+            let support = nets.faces.support(direction).min(nets.hull(direction));
+            let reach = frame.scale_exact() * Dd::of(support * sign);
             (frame.origin_exact()[k] + reach).f64()
         };
         let end = |sign: f64| DVec3::from_array([0, 1, 2].map(|k| extent(k, sign)));
