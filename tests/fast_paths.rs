@@ -466,6 +466,30 @@ fn wedges_of_any_size_and_place_are_within_the_bound() {
 }
 
 #[test]
+fn members_of_tilted_wedges_are_those_of_points() {
+    for (n, direction) in DIRECTIONS.into_iter().enumerate() {
+        for (m, (name, text)) in about(direction).enumerate() {
+            let (angle, start) = TURNS[(n + m) % TURNS.len()];
+            // The keys of the solid's last line follow its table.
+            let turn = format!("angle = {angle:?}\nstart = {start:?}\n");
+            let scene = scene(&format!("{text}{turn}"));
+            for grid in grids(&scene) {
+                let voxels = usize::try_from(grid.voxel_count()).expect("small");
+                let mut occupancy = vec![7; voxels];
+                LayerSampler::new(scene.assembly(), &grid, Selection::default())
+                    .fill_occupancy(&mut occupancy);
+                let [nx, ny, _] = grid.dims();
+                for (at, found) in occupancy.iter().enumerate() {
+                    let (i, j, k) = (at % nx, at / nx % ny, at / (nx * ny));
+                    let inside = scene.assembly().contains(grid.centre(i, j, k));
+                    assert_eq!(*found != 0, inside, "{name}, {turn}: voxel ({i}, {j}, {k})");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn flat_voxels_are_within_the_bound() {
     for (name, text) in wedges().iter().step_by(5) {
         let scene = scene(text);

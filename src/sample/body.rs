@@ -3,7 +3,7 @@
 //! ```text
 //!                      sides                     distances
 //!   upright axis       rings of all rows         a table for each layer, and one along the caps
-//!   another, full      squares of voxels         a table of the half-plane
+//!   another            squares of voxels         a table of the half-plane, for full turns
 //!   all others         cuts of each row          none: the exact path answers
 //! ```
 
@@ -96,7 +96,7 @@ impl BodySampler {
     pub(super) fn has_distances(&self) -> bool {
         match &self.way {
             Way::Upright { distances, .. } => distances.is_some(),
-            Way::Tilted(_) => true,
+            Way::Tilted(_) => (self.body.revolved()).is_some_and(TiltedSampler::has_distances),
             Way::Rows => false,
         }
     }

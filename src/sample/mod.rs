@@ -14,6 +14,7 @@
 //!   lookup      distances from a table of cells, for rows and points of a layer
 //!   blocks      squares of a layer, divided where the surface is near ──> bits
 //!   tilted      ties these to a body and its table
+//!   wedge       what less than a full turn leaves of a layer
 //!   body        the way of one body
 //!   composite   bits and distances of several
 //!   rows        the rest
@@ -42,6 +43,7 @@ mod tally;
 mod tilted;
 mod upright;
 mod volume;
+mod wedge;
 
 pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};

@@ -1,4 +1,5 @@
-//! Membership and signed distances of one body that is turned fully about any axis, a layer at a time.
+//! Membership and signed distances of one body that is turned about any axis, a layer at a time. Of less than a full
+//! turn it is the membership alone: the full turn's within the wedge.
 //!
 //! A voxel's distance depends on its radius and height in the body's frame. One table of small cells over those
 //! ([`CellTable`]) serves the whole grid; rows and points of a layer look their distances up ([`super::lookup`]). What
@@ -24,6 +25,7 @@ use super::layer::stored;
 use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
 use super::memory::copy_past_caches;
 use super::radial::Writing;
+use super::wedge::Wedge;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Real};
 use crate::region::{CellTable, Chain, Extent, MeridianField};
@@ -86,12 +88,8 @@ struct Close {
 }
 
 impl TiltedSampler {
-    /// The sampler of a body; `None` where its distance is not one of height and radius alone, or its numbers leave
-    /// the table no room.
+    /// The sampler of a body, or of its full turn; `None` where its numbers leave the table no room.
     pub(super) fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
-        if *body.turn() != Turn::Full {
-            return None;
-        }
         let frame = body.frame();
         let (scale, spacing) = (frame.scale(), grid.spacing());
         let least = spacing.min_element();
@@ -189,6 +187,14 @@ impl TiltedSampler {
         layer.fill(kernel, lanes, blocks, sides, |i, j| {
             body.side(grid.centre(i, j, k))
         });
+        if *body.turn() != Turn::Full {
+            Wedge::new(body, grid, k).narrow(sides);
+        }
+    }
+
+    /// Whether [`layer`](Self::layer) serves: the distances are those of the full turn.
+    pub(super) fn has_distances(body: &Revolved) -> bool {
+        *body.turn() == Turn::Full
     }
 
     /// Fills a layer with signed distances.
@@ -398,7 +404,5 @@ mod tests {
         }
         // Centres are rounded to more than a share of a voxel.
         assert!(!sampler(&text("[1, 0, 0]", ""), 1e6, 1e-6));
-        // A partial turn has caps.
-        assert!(!sampler(&text("[1, 0, 0]", "angle = 90\n"), -1.5, 0.08));
     }
 }

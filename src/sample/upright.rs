@@ -13,9 +13,10 @@
 //! wedge is the same in all layers and is kept as bits.
 
 use super::bits::{self, SideBits};
+use super::wedge::Wedge;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real, Side};
-use crate::solid::{Cuts, LayerCuts, Revolved, Ring, Row, Turn};
+use crate::solid::{LayerCuts, Revolved, Ring, Turn};
 
 /// Rows of a grid as one upright body sees them.
 #[derive(Debug)]
@@ -36,14 +37,6 @@ pub(super) struct UprightBody {
     columns: usize,
     rows: usize,
     wedge: Option<Wedge>,
-}
-
-/// The voxels of any layer that a body's wedge holds.
-#[derive(Debug)]
-struct Wedge {
-    inside: Vec<u64>,
-    /// Those on a plane of a cap; no words where there is none.
-    on: Vec<u64>,
 }
 
 /// What one thread reuses.
@@ -98,7 +91,7 @@ impl UprightBody {
             rows: ny,
             wedge: match body.turn() {
                 Turn::Full => None,
-                Turn::Partial(_) => Some(Wedge::new(body, grid)),
+                Turn::Partial(_) => Some(Wedge::new(body, grid, 0)),
             },
         })
     }
@@ -295,50 +288,4 @@ impl Ends<'_> {
 fn place(v: f64, last: f64) -> i32 {
     const LOW_BITS: f64 = 6_755_399_441_055_744.0;
     (v.max(0.0).min(last) + LOW_BITS).to_bits() as i32
-}
-
-impl Wedge {
-    fn new(body: &Revolved, grid: &GridSpec) -> Self {
-        let [nx, ny, _] = grid.dims();
-        let (mut inside, mut on) = (vec![0; bits::words_for(nx * ny)], Vec::new());
-        let mut sides = SideBits {
-            inside: &mut inside,
-            on: Some(&mut on),
-        };
-        let mut cuts = Cuts::default();
-        for j in 0..ny {
-            let row = Row {
-                first: grid.centre(0, j, 0),
-                step: grid.spacing().x,
-                count: nx,
-            };
-            cuts.reset(nx);
-            body.rows().wedge_cuts(&row, &mut cuts);
-            cuts.runs(|from, to| {
-                let middle = grid.centre(from + (to - from) / 2, j, 0);
-                sides.fill(j * nx + from, j * nx + to + 1, body.wedge_side(middle));
-            });
-        }
-        Self { inside, on }
-    }
-
-    /// Leaves of a full turn's sides those of the wedge.
-    fn narrow(&self, sides: &mut SideBits<'_>) {
-        if !self.on.is_empty()
-            && let Some(on) = sides.on()
-        {
-            for (word, own) in on.iter_mut().zip(&self.on) {
-                *word |= own;
-            }
-        }
-        for (word, own) in sides.inside.iter_mut().zip(&self.inside) {
-            *word &= own;
-        }
-        if let Some(on) = &mut sides.on {
-            // None where nobody was on the boundary so far.
-            for (word, inside) in on.iter_mut().zip(&*sides.inside) {
-                *word &= inside;
-            }
-        }
-    }
 }
