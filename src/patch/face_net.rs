@@ -52,7 +52,7 @@ pub(super) fn real(n: usize) -> f64 {
 }
 
 /// A rational surface piece over the unit square.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct Net {
     /// Degrees along both parameters.
     pub(super) degrees: [usize; 2],
@@ -108,41 +108,46 @@ fn add(sum: &mut Point4, factor: f64, p: Point4) {
     }
 }
 
-/// Values, first and second derivatives of the Bernstein polynomials of degree `p` at `t`.
-fn bernstein(p: usize, t: f64) -> [SmallVec<[f64; 8]>; 3] {
-    // Rows of degree p - 2, p - 1 and p, each from the one before.
-    let mut row: SmallVec<[f64; 8]> = SmallVec::from_elem(0.0, p + 1);
+/// Values, first and second derivatives of the Bernstein polynomials of degree `p` at `t`: the first `p + 1` of each.
+#[inline]
+fn bernstein<const N: usize>(p: usize, t: f64) -> [[f64; N]; 3] {
+    let mut row = [0.0; N];
+    let (mut first, mut second) = (row, row);
     row[0] = 1.0;
-    let mut lower: [SmallVec<[f64; 8]>; 2] = [row.clone(), row.clone()];
     let s = 1.0 - t;
     for n in 1..=p {
+        // The row is that of degree n - 1.
         if n == p {
-            lower[1].copy_from_slice(&row);
+            let factor = real(p);
+            for i in 0..p {
+                first[i] -= factor * row[i];
+                first[i + 1] += factor * row[i];
+            }
         }
         if n + 1 == p {
-            lower[0].copy_from_slice(&row);
+            let factor = real(p) * (real(p) - 1.0);
+            for i in 0..p - 1 {
+                second[i] += factor * row[i];
+                second[i + 1] -= 2.0 * factor * row[i];
+                second[i + 2] += factor * row[i];
+            }
         }
         for i in (1..=n).rev() {
             row[i] = s * row[i] + t * row[i - 1];
         }
         row[0] *= s;
     }
-    let mut first: SmallVec<[f64; 8]> = SmallVec::from_elem(0.0, p + 1);
-    let mut second = first.clone();
-    let n = real(p);
-    for i in 0..p {
-        first[i] -= n * lower[1][i];
-        first[i + 1] += n * lower[1][i];
-    }
-    if p >= 2 {
-        let n = n * (n - 1.0);
-        for i in 0..p - 1 {
-            second[i] += n * lower[0][i];
-            second[i + 1] -= 2.0 * n * lower[0][i];
-            second[i + 2] += n * lower[0][i];
+    [row, first, second]
+}
+
+impl Clone for Net {
+    fn clone(&self) -> Self {
+        // One copy, where cloning the list would go point by point.
+        Self {
+            degrees: self.degrees,
+            points: SmallVec::from_slice(&self.points),
         }
     }
-    [row, first, second]
 }
 
 impl Net {
@@ -315,9 +320,20 @@ impl Net {
 
     /// Value and derivatives at (u, v), all homogeneous.
     pub(super) fn jet(&self, u: f64, v: f64) -> Jet {
+        /// Coefficients of most nets, along either parameter.
+        const FEW: usize = 8;
+        if self.degrees.iter().all(|d| *d < FEW) {
+            self.jet_of::<FEW>(u, v)
+        } else {
+            self.jet_of::<{ MAX_DEGREE + 1 }>(u, v)
+        }
+    }
+
+    /// The same with room for `N` coefficients along either parameter.
+    fn jet_of<const N: usize>(&self, u: f64, v: f64) -> Jet {
         let [p, q] = self.degrees;
-        let [a, a1, a2] = bernstein(p, u);
-        let [b, b1, b2] = bernstein(q, v);
+        let [a, a1, a2] = bernstein::<N>(p, u);
+        let [b, b1, b2] = bernstein::<N>(q, v);
         let mut jet = Jet {
             value: [0.0; 4],
             u: [0.0; 4],

@@ -243,16 +243,15 @@ impl<'a> LayerSampler<'a> {
         out.fraction_sum = 0.0;
         out.tally = Tally::default();
 
-        let mut scratch = std::mem::take(&mut out.scratch);
-        self.find_sides(k, &mut scratch);
+        let scratch = &mut out.scratch;
+        self.find_sides(k, scratch);
         out.inside = bits::count(&scratch.inside);
         bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
         let measured = self.selection.sdf && self.fills_distance();
         if measured {
-            self.find_distances(k, &mut scratch, &mut out.sdf, false);
-            self.count_certainty(k, &mut scratch, &out.sdf, &mut out.tally.certainty);
+            self.find_distances(k, scratch, &mut out.sdf, false);
+            self.count_certainty(k, scratch, &out.sdf, &mut out.tally.certainty);
         }
-        out.scratch = scratch;
         self.rows(k, self.selection.sdf && !measured, out);
     }
 
