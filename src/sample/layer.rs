@@ -218,7 +218,8 @@ impl<'a> LayerSampler<'a> {
         if self.single.is_some() {
             return 0;
         }
-        let distances = if self.fills_distance() { 4 * 8 } else { 0 };
+        let measured = self.selection.sdf && self.fills_distance();
+        let distances = if measured { 4 * 8 } else { 0 };
         // Two bits for the side, and a distance.
         let bits = (2 + distances) * self.bodies.len() as u64;
         self.grid.layer_len() as u64 * bits / 8
