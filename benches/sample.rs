@@ -9,6 +9,8 @@
 //!   exact/SCENE               distances by the exact path alone, of a few rows: what a voxel costs without tables
 //!   formula                   sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid, its centre included
 //!   fill/TYPE                 what writing takes: the same buffers, the same threads
+//!   fresh/SCENE               sdf into a new volume: the tables, the pages' first touch, the distances
+//!   fresh_vec                 what a new list of as many numbers takes, one thread touching its pages
 //! ```
 //!
 //! Grids of 256 voxels along the longest side. Every answer is compared with the plain loops bit for bit, and at some
@@ -20,10 +22,10 @@ use std::hint::black_box;
 use voxlathe::Scene;
 use voxlathe::grid::GridSpec;
 use voxlathe::math::{Kernel, SimdLevel};
-use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
+use voxlathe::sample::{LayerBuffers, LayerSampler, Selection, signed_distance};
 
 const SIDE: u32 = 256;
-const SCENES: [&str; 2] = ["torus", "goblet"];
+const SCENES: [&str; 3] = ["torus", "goblet", "flange"];
 
 fn kernels() -> Vec<(&'static str, Kernel)> {
     [
@@ -145,6 +147,12 @@ fn sampling(c: &mut Criterion) {
         }
         group.bench_function(BenchmarkId::new("fill/f32", name), |b| {
             b.iter(|| filled(&mut sdf, black_box(2.0)));
+        });
+        group.bench_function(BenchmarkId::new("fresh", name), |b| {
+            b.iter(|| black_box(signed_distance(&scene, &grid)).is_ok());
+        });
+        group.bench_function(BenchmarkId::new("fresh_vec", name), |b| {
+            b.iter(|| black_box(vec![black_box(1.0_f32); n]));
         });
         group.throughput(Throughput::Elements(nx as u64));
         group.bench_function(BenchmarkId::new("exact", name), |b| {

@@ -1094,7 +1094,7 @@ fn geomdl_says_what_is_wrong_and_where() {
         (
             "\"weights\": [1, 2]",
             "\"weights\": [1, -2]",
-            "shape.data[0]: weight 1 is -2; weights must be finite and greater than zero",
+            "shape.data[0].control_points.weights[1]: found -2, wanted a weight, finite and greater than zero",
         ),
         (
             "{\"degree\"",

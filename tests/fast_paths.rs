@@ -374,9 +374,9 @@ fn compare(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
     worst
 }
 
-#[test]
-fn every_voxel_is_within_the_bound() {
-    for (name, text) in SCENES {
+/// Compares every voxel of scenes on all grids.
+fn compare_all(scenes: &[(&str, &str)]) {
+    for (name, text) in scenes {
         let scene = scene(text);
         let worst = grids(&scene)
             .iter()
@@ -387,14 +387,27 @@ fn every_voxel_is_within_the_bound() {
 }
 
 #[test]
+fn every_voxel_is_within_the_bound() {
+    compare_all(SCENES);
+}
+
+#[test]
 fn every_voxel_of_a_composite_is_within_the_bound() {
+    compare_all(COMPOSITES);
+}
+
+#[test]
+fn voxels_on_faces_and_caps_of_a_composite_are_those_of_points() {
+    // Centres at whole eighths, where the faces of the parts are, and those of several parts together.
+    let side = 0.125;
     for (name, text) in COMPOSITES {
         let scene = scene(text);
-        let worst = grids(&scene)
-            .iter()
-            .map(|g| compare(name, &scene, g))
-            .fold(0.0, f64::max);
-        eprintln!("{name}: worst error {worst:.3} of the bound");
+        let bounds = scene.bounds();
+        let first = (bounds.min / side).floor() - 1.0;
+        let dims = ((bounds.max / side).ceil() - first + 2.0).as_uvec3();
+        let dims = dims.to_array().map(|d| d as usize);
+        let grid = GridSpec::new(dims, (first - 0.5) * side, DVec3::splat(side));
+        compare(name, &scene, &grid.expect("a grid"));
     }
 }
 

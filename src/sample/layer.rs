@@ -10,6 +10,7 @@ use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
 use crate::math::Kernel;
 use crate::solid::{Assembly, Body, Part, Scalar};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A quantity sampled on a grid.
@@ -144,7 +145,7 @@ impl<'a> LayerSampler<'a> {
         } else {
             (assembly.bodies().to_vec(), Vec::new())
         };
-        let bodies = assembly.bodies().iter();
+        let bodies = assembly.bodies().par_iter();
         let bodies = bodies.map(|b| BodySampler::new(b, grid, selection.sdf));
         Self {
             cancel: None,

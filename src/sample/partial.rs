@@ -135,9 +135,12 @@ impl PartialSampler {
         };
         let pieces = body.boundary().iter().filter(|b| !b.piece.on_axis);
         let pieces: Vec<_> = pieces.cloned().collect();
-        let swept = field(&pieces, [0.0, f64::from(plane.reach()) * cell], true)?;
         let [low, high] = caps.reach().map(|a| a / scale);
-        let edges = field(body.boundary(), [low - cell, high + cell], false)?;
+        let (swept, edges) = rayon::join(
+            || field(&pieces, [0.0, f64::from(plane.reach()) * cell], true),
+            || field(body.boundary(), [low - cell, high + cell], false),
+        );
+        let (swept, edges) = (swept?, edges?);
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
         let near = (NEAR * spacing.min_element()) as f32;
         Some(Self {
