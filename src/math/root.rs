@@ -8,7 +8,7 @@
 //!   y = s r                sqrt(s) ≈ y + r/2 (s - y²)     in f64, to 3/2 δ²
 //! ```
 //!
-//! * Range: s from 1e-36 to 1e36, and 0; below, the root is off by 1e-18 at most.
+//! * Range: s from 1e-36 to 1e36, and 0; below, the root is off by 1e-18 at most. Above, there may be none.
 //! * Accuracy: 2^-40 of the root.
 //! * The same operations in the same order for any lanes: the same bits.
 

@@ -48,8 +48,9 @@ const PADDING: usize = 2;
 /// Tolerances to which a distance is so small that the rounding of the first coefficient does not count: less than a
 /// fifth of a tolerance.
 const SMALL: f64 = 4_194_304.0;
-/// Value of the columns that are left out: further away than anything, and its square is in range.
-pub(crate) const UNUSED: f32 = 1e30;
+/// Value of the columns that are left out: further away than anything, and its square has a root by
+/// [`crate::math::root`].
+pub(crate) const UNUSED: f32 = 1e17;
 /// Features that may follow each other within one cell.
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.

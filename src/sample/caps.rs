@@ -23,8 +23,8 @@ use crate::solid::Revolved;
 
 /// Voxels that are decided on together.
 pub(super) const GROUP: usize = 16;
-/// Lengths above this have no square in range of f32.
-const FAR: f64 = 1e18;
+/// Lengths above this are too near to what columns hold that are left out, and their squares to the end of f32.
+const FAR: f64 = 1e16;
 /// Share of the least spacing within which a point may be on either side of a cap's plane: some tens of roundings of
 /// a place 65 000 cells away.
 const GUARD: f64 = 1e-9;
