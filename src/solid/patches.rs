@@ -224,9 +224,14 @@ impl Patches {
         for (later, volume) in self.nets.volumes.iter().enumerate() {
             for piece in volume.to_bezier().unwrap_or_default() {
                 let at = piece.parameters([0.5; 3]);
-                let Ok(middle) = volume.evaluate(at) else {
+                let Ok((middle, gradient)) = volume.gradient(at) else {
                     continue;
                 };
+                let [a, b, c] = gradient.map(DVec3::from_array);
+                // A flat cell holds nothing that another could hold, too.
+                if !(a.cross(b).dot(c).abs() > 1e-9 * a.length() * b.length() * c.length()) {
+                    continue;
+                }
                 let middle = DVec3::from_array(middle);
                 // Of several the lowest answers. What is its own is so to far less than this.
                 let apart = |found: &Preimage| {
