@@ -216,7 +216,8 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         CompressionName::Pxr24 => Compression::Pxr24,
     };
     let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
-    let layer_bytes = layer_bytes(&grid, &selection, &channels, scalars.len(), compression);
+    let sampled = LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection);
+    let layer_bytes = layer_bytes(&grid, sampled, &channels, scalars.len(), compression);
     let limit = arguments.memory_limit.unwrap_or_else(default_memory_limit);
     if layer_bytes > limit {
         let [nx, ny, _] = grid.dims();
@@ -254,10 +255,11 @@ fn workers_within(memory: u64, layer_bytes: u64) -> usize {
     (memory / layer_bytes.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize
 }
 
-/// Memory that a worker takes: the samples of one layer, their EXR form and what makes it.
+/// Memory that a worker takes: the samples of one layer, `sampled` bytes but for scalars, their EXR form and what makes
+/// it.
 fn layer_bytes(
     grid: &GridSpec,
-    selection: &Selection,
+    sampled: u64,
     channels: &[ChannelSpec],
     scalars: usize,
     compression: Compression,
@@ -269,7 +271,7 @@ fn layer_bytes(
     } else {
         3
     };
-    LayerSampler::bytes_per_layer(grid, selection)
+    sampled
         .saturating_add(scalars)
         .saturating_add(largest_slice_bytes(grid, channels).saturating_mul(copies))
 }

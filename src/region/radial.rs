@@ -218,6 +218,7 @@ impl RadialTable {
                 part * part * part * d,
                 value - f64::from(value as f32),
             ];
+            self.ridges[k] = [0; 2];
             let group = &mut self.groups[k / GROUP];
             for (row, v) in group.iter_mut().zip(coefficients) {
                 row[k % GROUP] = v as f32;

@@ -25,6 +25,8 @@ use crate::solid::Revolved;
 pub(super) const GROUP: usize = 16;
 /// Lengths above this are too near to what columns hold that are left out, and their squares to the end of f32.
 const FAR: f64 = 1e16;
+/// Spacings below this are too near to what roots of the least squares are off by.
+const NARROW: f64 = 1e-12;
 /// Share of the least spacing within which a point may be on either side of a cap's plane: some tens of roundings of
 /// a place 65 000 cells away.
 const GUARD: f64 = 1e-9;
@@ -79,10 +81,13 @@ impl CapPlane {
         };
         let (mut x, y) = (list(0), list(1));
         let ends = |v: &[f64]| v[0].abs().max(v[v.len() - 1].abs());
-        if !(ends(&x).max(ends(&y)) < FAR) {
+        let bounds = body.bounds();
+        let furthest = [ends(&x), ends(&y), ends(&list(2)), bounds.longest_side()];
+        let apart = (bounds.min - frame.origin()).abs().max_element();
+        let least = grid.spacing().min_element();
+        if !(furthest.into_iter().fold(apart, f64::max) < FAR && least > NARROW) {
             return None;
         }
-        let least = grid.spacing().min_element();
         let last = x[x.len() - 1];
         x.resize(x.len().next_multiple_of(GROUP), last);
         let [e1, e2] = [frame.axis(0), frame.axis(1)];

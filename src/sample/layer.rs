@@ -195,11 +195,16 @@ impl<'a> LayerSampler<'a> {
 
     /// Bytes that one layer's buffers take.
     #[must_use]
-    pub fn bytes_per_layer(grid: &GridSpec, selection: &Selection) -> u64 {
+    pub fn bytes_per_layer(assembly: &Assembly, grid: &GridSpec, selection: &Selection) -> u64 {
+        let voxels = grid.layer_len() as u64;
         let each = |on: bool, bytes: u64| if on { bytes } else { 0 };
-        // A bit of each voxel is kept beside its byte.
-        grid.layer_len() as u64 / 8
-            + grid.layer_len() as u64
+        // A bit of each voxel is kept beside its byte, and two for each body of a composite.
+        let bodies = match assembly.single_index() {
+            Some(_) => 0,
+            None => assembly.bodies().len() as u64,
+        };
+        (voxels / 8).saturating_mul(1 + 2 * bodies)
+            + voxels
                 * (1 + each(selection.fraction, 4)
                     + each(selection.sdf, 4)
                     + each(selection.material, 4))
@@ -212,18 +217,14 @@ impl<'a> LayerSampler<'a> {
         self.bodies.iter().map(BodySampler::bytes).sum()
     }
 
-    /// Bytes that each thread takes beside [`bytes_per_layer`](Self::bytes_per_layer): the sides and distances of the
-    /// bodies of a composite.
+    /// Bytes that each thread takes beside [`bytes_per_layer`](Self::bytes_per_layer): the distances of a composite's
+    /// bodies, which [`with_exact_distances`](Self::with_exact_distances) does without.
     #[must_use]
     pub fn bytes_per_thread(&self) -> u64 {
-        if self.single.is_some() {
+        if self.single.is_some() || !(self.selection.sdf && self.fills_distance()) {
             return 0;
         }
-        let measured = self.selection.sdf && self.fills_distance();
-        let distances = if measured { 4 * 8 } else { 0 };
-        // Two bits for the side, and a distance.
-        let bits = (2 + distances) * self.bodies.len() as u64;
-        self.grid.layer_len() as u64 * bits / 8
+        (self.grid.layer_len() as u64).saturating_mul(4 * self.bodies.len() as u64)
     }
 
     /// Fills `out` with layer `k`.

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The axis frame is turned so that y stays the same along a row. Places are rounded once, from f64, by half a place at
-//! most and what their root is off by, a thousandth of one; what follows of them is exact but for the sum of some numbers of a cell's size.
+//! most and what their root is off by, a sixteenth of one; what follows of them is exact but for the sum of some numbers of a cell's size.
 //!
 //! The plain loops are the definition; compiled for wider lanes they do the same operations in the same order.
 
