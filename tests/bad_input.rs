@@ -18,10 +18,6 @@ use voxlathe::sample;
 /// How long a refusal, or a small grid of a hostile scene, may take.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// How long the exact volume of one may take, too: seconds of both processors by its own bound, while the other tests
-/// want them. What takes longer has no end.
-const PATIENCE: Duration = Duration::from_secs(150);
-
 const RING: &str = r#"schema = 1
 name = "ring"
 units = "mm"
@@ -488,9 +484,9 @@ fn survives(name: &str, text: String) -> Result<(), String> {
     std::thread::spawn(move || {
         let _ = send.send(answer(&text));
     });
-    match receive.recv_timeout(PATIENCE) {
+    match receive.recv_timeout(LIMIT) {
         Ok(result) => result,
-        Err(mpsc::RecvTimeoutError::Timeout) => panic!("{name}: still working after {PATIENCE:?}"),
+        Err(mpsc::RecvTimeoutError::Timeout) => panic!("{name}: still working after {LIMIT:?}"),
         Err(mpsc::RecvTimeoutError::Disconnected) => panic!("{name}: panicked"),
     }
 }
