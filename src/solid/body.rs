@@ -233,7 +233,7 @@ impl Body {
         }
     }
 
-    /// What a question costs, compared with one to a solid of lines and arcs.
+    /// What a question costs, compared with one to a solid of lines.
     pub(super) fn price(&self) -> u64 {
         match self {
             Self::Revolved(b) => b.price(),

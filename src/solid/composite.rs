@@ -29,9 +29,11 @@ const TOLERANCE: f64 = 1e-12;
 const STAND_IN: f64 = 64.0;
 /// Panels to begin with, times the bodies that each may cross: more are not begun.
 const MOST_BEGUN: usize = 300_000;
-/// Stretches of circles looked at, those against free-form curves counted several times, after which
-/// the estimates are taken as they are: some seconds' work.
-const MOST_WORK: u64 = 6_000_000;
+/// Stretches of circles looked at, those against curves counted several times, after which the estimates are taken as
+/// they are: some seconds' work.
+const MOST_WORK: u64 = 4_000_000;
+/// Panels halved between two looks at the work.
+const BATCH: usize = 64;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 /// Places of the quantities.
@@ -197,7 +199,7 @@ fn over_faces(
         m.max(b.min.abs().max(b.max.abs()).max_element())
     });
     let faces = Faces::new(bodies, terms, reach);
-    let most = if stand_ins { 5 * MOST_WORK } else { MOST_WORK };
+    let most = if stand_ins { 10 * MOST_WORK } else { MOST_WORK };
     let mut panels = integrated(&faces, size, most)?;
     panels.sort_by(|a, b| {
         let key = |p: &Panel| p.sheet.number();
@@ -236,56 +238,63 @@ fn about(bodies: &[Arc<Body>], terms: &[Term], centre: DVec3) -> (Vec<Arc<Body>>
 /// Panels whose estimated errors sum to the tolerances, or the best that `most` stretches give; `None` where
 /// even the first are too many.
 fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Panel>> {
-    // A round of twice the work is given up: where surfaces nearly coincide each of its circles takes thousands of
-    // stretches. `None` then. Whether it is does not depend on the order of the work.
-    let make = |work: Vec<(Sheet, [f64; 2])>| -> Option<Vec<Panel>> {
-        let round = faces.work() + 2 * most;
-        let panels = work.into_par_iter();
-        panels
-            .map(|(s, range)| (faces.work() <= round).then(|| Panel::new(faces, s, range)))
-            .collect()
-    };
-    let mut panels = make(faces.sheets(MOST_BEGUN)?)?;
+    let mut panels = made(faces, faces.sheets(MOST_BEGUN)?, 2 * most)?;
     loop {
-        let tolerances = tolerances(&panels, size);
-        let mut order: Vec<(f64, usize)> = panels
-            .iter()
-            .enumerate()
-            .map(|(i, p)| (p.excess(&tolerances), i))
-            .collect();
-        order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        // The worst first, as many as it takes for the rest to be good.
-        let mut left: f64 = order.iter().map(|o| o.0).sum();
-        let worst = order.iter().take_while(|(excess, _)| {
-            let more = left > 0.5;
-            left -= excess;
-            more
-        });
-        let mut chosen: Vec<usize> = worst.map(|o| o.1).collect();
-        let divides = |p: &Panel| {
-            let [a, b] = p.range;
-            let m = 0.5 * (a + b);
-            m > a && m < b
-        };
-        // Halving does not mend rounding.
-        let noisy = |p: &Panel| {
-            (AREA..EDGES)
-                .all(|k| p.integrals[k].error <= p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0))
-        };
-        chosen.retain(|&i| divides(&panels[i]) && !noisy(&panels[i]));
-        if chosen.is_empty() || faces.work() > most {
-            return Some(panels);
+        let chosen = worst(&panels, faces, &tolerances(&panels, size));
+        let mut halved = Vec::new();
+        for batch in chosen.chunks(BATCH) {
+            let halves = batch.iter().flat_map(|&i| panels[i].halves()).collect();
+            let Some(halves) = made(faces, halves, most) else {
+                break;
+            };
+            halved.extend_from_slice(batch);
+            panels.extend(halves);
         }
-        chosen.sort_unstable();
-        let halves = chosen.iter().flat_map(|&i| panels[i].halves()).collect();
-        let Some(halves) = make(halves) else {
-            return Some(panels);
-        };
-        for &i in chosen.iter().rev() {
+        halved.sort_unstable();
+        for &i in halved.iter().rev() {
             panels.swap_remove(i);
         }
-        panels.extend(halves);
+        if halved.len() < chosen.len() || chosen.is_empty() {
+            return Some(panels);
+        }
     }
+}
+
+/// The panels of all stretches; `None` where the work passes `most`, or has passed it, whatever the order of the work.
+/// Where surfaces nearly coincide each circle takes thousands of stretches.
+fn made(faces: &Faces, work: Vec<(Sheet, [f64; 2])>, most: u64) -> Option<Vec<Panel>> {
+    work.into_par_iter()
+        .map(|(sheet, range)| {
+            let panel = (faces.work() <= most).then(|| Panel::new(faces, sheet, range));
+            panel.filter(|_| faces.work() <= most)
+        })
+        .collect()
+}
+
+/// The panels to be halved for the rest to be good: of those with the largest errors the ones that halving mends, the
+/// largest first.
+fn worst(panels: &[Panel], faces: &Faces, tolerances: &[f64; QUANTITIES]) -> Vec<usize> {
+    let excess = |(i, p): (usize, &Panel)| (p.excess(tolerances), i);
+    let mut order: Vec<(f64, usize)> = panels.iter().enumerate().map(excess).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut left: f64 = order.iter().map(|o| o.0).sum();
+    let taken = order.iter().take_while(|(excess, _)| {
+        let more = left > 0.5;
+        left -= excess;
+        more
+    });
+    let divides = |p: &Panel| {
+        let [a, b] = p.range;
+        let m = 0.5 * (a + b);
+        m > a && m < b
+    };
+    // Halving does not mend rounding.
+    let noisy = |p: &Panel| {
+        let least = |k: usize| p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0);
+        (AREA..EDGES).all(|k| p.integrals[k].error <= least(k))
+    };
+    let mends = |i: &usize| divides(&panels[*i]) && !noisy(&panels[*i]);
+    taken.map(|o| o.1).filter(mends).collect()
 }
 
 /// Errors that are good enough.

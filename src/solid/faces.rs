@@ -35,7 +35,7 @@ pub(super) struct Faces {
     reach: f64,
     /// How far beside a surface its two sides are asked.
     hair: f64,
-    /// What a stretch costs against each body, compared with one of lines and arcs.
+    /// What a question costs to each body, compared with one of lines.
     prices: Vec<u64>,
     work: AtomicU64,
 }
@@ -96,7 +96,7 @@ impl Faces {
         Some(sheets)
     }
 
-    /// Stretches of paths looked at so far.
+    /// Questions to bodies so far, for stretches of paths and for places of crossings, times their prices.
     pub(super) fn work(&self) -> u64 {
         self.work.load(Ordering::Relaxed)
     }
@@ -168,7 +168,7 @@ impl Faces {
             let room = [0.125 * self.hair, 4.0 * self.hair];
             let search = |path: &Path, cuts: &mut Vec<f64>| {
                 let found = path.crossings(other, rule.range, room, cuts);
-                let work = found.stretches * self.prices[k];
+                let work = found.questions * self.prices[k];
                 self.work.fetch_add(work, Ordering::Relaxed);
                 found.along
             };

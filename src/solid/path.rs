@@ -294,7 +294,7 @@ impl Path {
             }
         };
         let mut work = vec![Open { a, b, ends: None }];
-        let mut seen = 0_u64;
+        let (mut seen, mut steps) = (0_u64, 0_u64);
         while let Some(Open { a, b, ends }) = work.pop() {
             seen += 1;
             let (m, h) = (0.5 * (a + b), 0.5 * (b - a));
@@ -331,12 +331,16 @@ impl Path {
                 match parabola([fa, middle, fb]) {
                     Crossings::None => continue,
                     Crossings::One => {
-                        out.push(root(&within, [a, b], [fa, fb], 0.25 * margin));
+                        let (place, taken) = root(&within, [a, b], [fa, fb], 0.25 * margin);
+                        out.push(place);
+                        steps += taken;
                         continue;
                     }
                     Crossings::Unknown if fine => {
                         if (fa < 0.0) != (fb < 0.0) {
-                            out.push(root(&within, [a, b], [fa, fb], 0.25 * margin));
+                            let (place, taken) = root(&within, [a, b], [fa, fb], 0.25 * margin);
+                            out.push(place);
+                            steps += taken;
                         }
                         continue;
                     }
@@ -349,7 +353,7 @@ impl Path {
         }
         Searched {
             along,
-            stretches: seen,
+            questions: seen + steps,
         }
     }
 }
@@ -358,8 +362,8 @@ impl Path {
 pub(super) struct Searched {
     /// Whether the path may run along the surface.
     pub(super) along: bool,
-    /// How many stretches were looked at.
-    pub(super) stretches: u64,
+    /// How often the body was asked, for stretches and for places of crossings.
+    pub(super) questions: u64,
 }
 
 /// A stretch to look at, with the signed distances of its ends, where they are known.
@@ -409,7 +413,7 @@ fn parabola([a, m, b]: [f64; 3]) -> Crossings {
 }
 
 /// The place where signed distances change sign, down to a distance of `zero` or the resolution of
-/// the parameter.
+/// the parameter; and the steps it took.
 ///
 /// By turns a secant, a step beyond where it led, which closes the bracket from the other side, and
 /// a halving, which serves distances that jump: beside an edge of two faces.
@@ -418,11 +422,12 @@ fn root(
     [mut a, mut b]: [f64; 2],
     [mut fa, mut fb]: [f64; 2],
     zero: f64,
-) -> f64 {
-    for step in 0..120 {
+) -> (f64, u64) {
+    const STEPS: u64 = 120;
+    for step in 0..STEPS {
         let middle = 0.5 * (a + b);
         if !(b - a > 4.0 * f64::EPSILON * a.abs().max(b.abs()).max(1.0)) {
-            return middle;
+            return (middle, step);
         }
         let secant = (a * fb - b * fa) / (fb - fa);
         let proposed = match step % 3 {
@@ -439,7 +444,7 @@ fn root(
         };
         let f = signed(x);
         if f.abs() <= zero {
-            return x;
+            return (x, step);
         }
         if (f < 0.0) == (fa < 0.0) {
             (a, fa) = (x, f);
@@ -447,5 +452,5 @@ fn root(
             (b, fb) = (x, f);
         }
     }
-    0.5 * (a + b)
+    (0.5 * (a + b), STEPS)
 }

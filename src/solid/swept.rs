@@ -37,10 +37,14 @@ impl Revolved {
         dr.hypot(dz) * self.frame().scale()
     }
 
-    /// Free-form curves cost more to look at than lines and arcs.
+    /// What a question costs, compared with one to a solid of lines: arcs and free-form curves cost more to look at.
     pub(super) fn price(&self) -> u64 {
-        let free = self.boundary().iter().any(|p| p.piece.degree() > 2);
-        if free { 10 } else { 1 }
+        let degrees = self.boundary().iter().map(|p| p.piece.degree());
+        match degrees.max() {
+            None | Some(0 | 1) => 1,
+            Some(2) => 2,
+            Some(_) => 10,
+        }
     }
 
     /// The circle or the segment of a patch at parameter `t` of its piece.
