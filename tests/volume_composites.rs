@@ -142,3 +142,52 @@ fn the_estimate_of_a_joined_region_covers_its_error() {
     );
     assert!(off <= found.error_estimate.volume);
 }
+
+/// A box as a volume: its corners, its degree along every parameter, and where it is placed.
+fn block([low, high]: [[f64; 3]; 2], degree: usize, rest: &str) -> String {
+    let knots: Vec<u32> = [0, 1].iter().flat_map(|k| vec![*k; degree + 1]).collect();
+    let n = degree + 1;
+    let at = |c: usize, i: usize| low[c] + (high[c] - low[c]) * i as f64 / degree as f64;
+    let points: Vec<[f64; 3]> = (0..n * n * n)
+        .map(|i| [at(0, i % n), at(1, i / n % n), at(2, i / (n * n))])
+        .collect();
+    format!(
+        "[[solid]]\nkind = 'volume'\npatches = [{{ degrees = [{degree}, {degree}, {degree}], \
+         knots = [{knots:?}, {knots:?}, {knots:?}], points = {points:?} }}]\n{rest}\n"
+    )
+}
+
+#[test]
+fn boxes_of_patches_with_faces_in_one_plane() {
+    let cube = [[0.0; 3], [1.0; 3]];
+    // Face on face; one within the other up to a face; shifted along a common plane; two edges in one line; the same box.
+    let cases = [
+        ([[1.0, 0.25, 0.25], [2.0, 0.75, 0.75]], "add", 1.25, 8.0),
+        ([[0.5, 0.0, 0.0], [1.0, 1.0, 1.0]], "add", 1.0, 6.0),
+        ([[0.5, 0.0, 0.0], [1.0, 1.0, 1.0]], "subtract", 0.5, 4.0),
+        ([[0.5, 0.5, 0.0], [1.5, 1.5, 1.0]], "add", 1.75, 9.5),
+        ([[0.5, 0.5, 0.0], [1.5, 1.5, 1.0]], "intersect", 0.25, 2.5),
+        ([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], "add", 1.0, 6.0),
+        (
+            [[0.25, 0.25, 0.0], [0.75, 0.75, 1.0]],
+            "subtract",
+            0.75,
+            7.5,
+        ),
+    ];
+    let slanted = "place = [{ rotate = { axis = [1, 2, 3], degrees = 25 } }, { scale = 3 }]";
+    for (n, (other, operation, volume, area)) in cases.into_iter().enumerate() {
+        for (rest, scale) in [("", 1.0_f64), (slanted, 3.0)] {
+            let degree = 1 + n % 2;
+            let text = block(cube, degree, rest)
+                + &block(other, 1, &format!("operation = '{operation}'\n{rest}"));
+            check(
+                &format!("{other:?} {operation} x {scale}"),
+                &text,
+                [volume * scale.powi(3), 0.0],
+                [area * scale.powi(2), 0.0],
+                1e-9,
+            );
+        }
+    }
+}

@@ -4,7 +4,7 @@ use super::bounds;
 use super::distance;
 use super::face::{Frame, OuterFace, collect};
 use super::face_net::length;
-use super::face_tree::{Box3, PatchTree};
+use super::face_tree::{Box3, PatchTree, SubPatch};
 use super::line;
 use crate::math::Aabb;
 use crate::nurbs::{NurbsError, NurbsVolume};
@@ -166,15 +166,33 @@ impl FaceSet {
         (local * self.frame.unit + n.dot(self.frame.centre)) * most
     }
 
-    /// Whether a box may hold a point of the outer faces: `false` is certain.
-    pub(crate) fn may_touch(&self, min: DVec3, max: DVec3) -> bool {
-        // Control points are off by some ten ε of the unit.
-        let slack = 64.0 * f64::EPSILON;
-        let low = self.frame.local(min).map(|x| x - slack);
-        let high = self.frame.local(max).map(|x| x + slack);
-        let meets = |b: &Box3| (0..3).all(|c| !(b.min[c] > high[c] || b.max[c] < low[c]));
+    /// Whether the outer faces may meet a shape within `bounds`: `false` is certain.
+    ///
+    /// * `span`: the least and the largest height of the shape along a unit vector, in model units.
+    ///
+    /// A shape beside a nearly flat part of a face is told apart along the part's normal.
+    pub(crate) fn may_touch(&self, bounds: &Aabb, span: impl Fn(DVec3) -> [f64; 2]) -> bool {
+        let (low, high) = (self.frame.local(bounds.min), self.frame.local(bounds.max));
+        let meets = |b: &Box3, slack: f64| {
+            (0..3).all(|c| !(b.min[c] - slack > high[c] || b.max[c] + slack < low[c]))
+        };
+        let centre = self.frame.centre;
+        let rounding = 8.0 * f64::EPSILON * centre.abs().max_element();
+        let beside = |part: &SubPatch| {
+            let up = DVec3::from_array(part.up);
+            let middle = up.dot(centre + DVec3::from_array(part.origin) * self.frame.unit);
+            let [from, to] = span(up).map(|height| height - middle);
+            let [low, high] = part.heights.map(|h| h * self.frame.unit);
+            let slack = part.slack() * self.frame.unit + rounding;
+            from > high + slack || to < low - slack
+        };
         let found = std::cell::Cell::new(false);
-        (self.tree).visit(|b| !found.get() && meets(b), |_| found.set(true));
+        let keep = |b: &Box3| !found.get() && meets(b, SubPatch::MOST_SLACK);
+        self.tree.visit(keep, |i| {
+            let part = &self.tree.parts[i];
+            let apart = !meets(self.tree.bounds(i), part.slack()) || beside(part);
+            found.set(found.get() || !apart);
+        });
         found.get()
     }
 

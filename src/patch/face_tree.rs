@@ -9,7 +9,7 @@
 //!   [`Frame`](super::face::Frame).
 //! * Accuracy: control points of a sub-patch are off by at most some ten ε of the unit.
 
-use super::face_net::{Net, cartesian, length, real};
+use super::face_net::{Net, cartesian, cross, dot, length, minus, real};
 
 /// A nearly flat part of a face.
 #[derive(Debug, Clone)]
@@ -19,6 +19,10 @@ pub(super) struct SubPatch {
     pub(super) origin: [f64; 3],
     /// Largest distance of a control point from `origin`.
     pub(super) radius: f64,
+    /// Unit normal of its diagonals, 0 where they are parallel, and the least and the largest height of a control point
+    /// along it, from `origin`.
+    pub(super) up: [f64; 3],
+    pub(super) heights: [f64; 2],
     /// Index of the face.
     pub(super) face: u32,
     /// Where the part begins in the face's parameters, and its sides there.
@@ -172,6 +176,11 @@ impl PatchTree {
         }
     }
 
+    /// The box of a part.
+    pub(super) fn bounds(&self, part: usize) -> &Box3 {
+        &self.boxes[part]
+    }
+
     /// Calls `visit` with every part whose box, and the boxes around it, pass `keep`.
     #[inline]
     pub(super) fn visit(&self, keep: impl Fn(&Box3) -> bool, mut visit: impl FnMut(usize)) {
@@ -278,13 +287,46 @@ impl SubPatch {
         let origin = std::array::from_fn(|c| 0.5 * (min[c] + max[c]));
         let net = net.seen_from(origin);
         let radius = (net.points.iter()).fold(0.0_f64, |r, &p| r.max(length(cartesian(p))));
+        let up = across_diagonals(&net);
+        let heights = net.points.iter().map(|&p| dot(up, cartesian(p)));
+        let heights = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| {
+            [low.min(h), high.max(h)]
+        });
         Self {
             net,
             origin,
             radius,
+            up,
+            heights,
             face,
             low,
             sides,
         }
+    }
+    /// The most of [`slack`](Self::slack) that any part has.
+    pub(super) const MOST_SLACK: f64 = 64.0 * f64::EPSILON;
+
+    /// How far its control points may be from those of the face's exact part, in units: some roundings in making
+    /// them relative to the middle, and one a level of each halving.
+    pub(super) fn slack(&self) -> f64 {
+        let halvings = |k: usize| -self.sides[k].log2();
+        let levels = [0, 1].map(|k| halvings(k) * real(self.net.degrees[k]));
+        (f64::EPSILON * (4.0 + levels[0] + levels[1])).min(Self::MOST_SLACK)
+    }
+}
+
+/// The unit vector normal to both diagonals of a net, or 0.
+fn across_diagonals(net: &Net) -> [f64; 3] {
+    let [n, m] = net.degrees;
+    let corner = |i: usize, j: usize| cartesian(net.points[net.at(i, j)]);
+    let normal = cross(
+        minus(corner(n, m), corner(0, 0)),
+        minus(corner(0, m), corner(n, 0)),
+    );
+    let size = length(normal);
+    if size > 0.0 && size.is_finite() {
+        normal.map(|c| c / size)
+    } else {
+        [0.0; 3]
     }
 }

@@ -161,8 +161,7 @@ impl BlockLayer<'_> {
         look_up(
             kernel,
             self.table,
-            self.view,
-            Points::Any(i, j),
+            Points::Any(self.view, i, j),
             limit,
             lanes,
             (&mut values[..count], &mut marks[..count / LANES]),

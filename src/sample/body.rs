@@ -3,7 +3,7 @@
 //! ```text
 //!                      sides                     distances
 //!   upright axis       rings of all rows         a table for each layer, and one along the caps
-//!   another            squares of voxels         a table of the half-plane, for full turns
+//!   another            squares of voxels         a table of the half-plane, and one along the caps
 //!   all others         cuts of each row          none: the exact path answers
 //! ```
 
@@ -12,10 +12,11 @@ use super::layer::Cancel;
 use super::partial::{PartialSampler, PartialScratch};
 use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
 use super::tilted::{TiltedSampler, TiltedScratch};
+use super::tilted_caps::{TiltedCapScratch, TiltedCaps};
 use super::upright::{UprightBody, UprightScratch};
 use crate::grid::GridSpec;
 use crate::math::Kernel;
-use crate::solid::{Body, Cuts, Revolved, Row};
+use crate::solid::{Body, Cuts, Revolved, Row, Turn};
 use std::sync::Arc;
 
 /// One body on one grid.
@@ -32,7 +33,10 @@ enum Way {
         sides: UprightBody,
         distances: Option<UprightDistances>,
     },
-    Tilted(TiltedSampler),
+    Tilted {
+        sides: TiltedSampler,
+        distances: TiltedDistances,
+    },
     Rows,
 }
 
@@ -44,6 +48,16 @@ enum UprightDistances {
     Partial(PartialSampler),
 }
 
+/// What the distances of a body with another axis are found with, besides what finds its sides.
+#[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "there are few")]
+enum TiltedDistances {
+    Full,
+    Partial(TiltedCaps),
+    /// The exact path answers, or nobody asks.
+    None,
+}
+
 /// What one thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct BodyScratch {
@@ -51,6 +65,7 @@ pub(super) struct BodyScratch {
     radial: RadialScratch,
     partial: PartialScratch,
     tilted: TiltedScratch,
+    tilted_caps: TiltedCapScratch,
     cuts: Cuts,
 }
 
@@ -73,7 +88,10 @@ impl BodySampler {
                     distances: wanted.and_then(|body| UprightDistances::new(body, grid)),
                 },
                 None if revolved.rows().is_upright() => Way::Rows,
-                None => TiltedSampler::new(revolved, grid).map_or(Way::Rows, Way::Tilted),
+                None => TiltedSampler::new(revolved, grid).map_or(Way::Rows, |sides| Way::Tilted {
+                    sides,
+                    distances: TiltedDistances::new(wanted, grid),
+                }),
             }
         });
         let body = body.clone();
@@ -87,7 +105,7 @@ impl BodySampler {
                 sides,
                 distances: None,
             },
-            Way::Tilted(_) | Way::Rows => Way::Rows,
+            Way::Tilted { .. } | Way::Rows => Way::Rows,
         };
         Self { way, ..self }
     }
@@ -96,15 +114,20 @@ impl BodySampler {
     pub(super) fn has_distances(&self) -> bool {
         match &self.way {
             Way::Upright { distances, .. } => distances.is_some(),
-            Way::Tilted(_) => (self.body.revolved()).is_some_and(TiltedSampler::has_distances),
+            Way::Tilted { distances, .. } => !matches!(distances, TiltedDistances::None),
             Way::Rows => false,
         }
     }
 
     /// Whether [`distances`](Self::distances) rests on the layer's sides.
     pub(super) fn distances_need_sides(&self) -> bool {
-        let partial = |d: &UprightDistances| matches!(d, UprightDistances::Partial(_));
-        matches!(&self.way, Way::Upright { distances: Some(d), .. } if partial(d))
+        match &self.way {
+            Way::Upright { distances, .. } => {
+                matches!(distances, Some(UprightDistances::Partial(_)))
+            }
+            Way::Tilted { distances, .. } => matches!(distances, TiltedDistances::Partial(_)),
+            Way::Rows => false,
+        }
     }
 
     /// Bytes that all threads share.
@@ -115,7 +138,10 @@ impl BodySampler {
                 Some(UprightDistances::Partial(one)) => one.bytes(),
                 None => 0,
             },
-            Way::Tilted(one) => one.bytes(),
+            Way::Tilted { sides, distances } => match distances {
+                TiltedDistances::Partial(caps) => sides.bytes() + caps.bytes(),
+                TiltedDistances::Full | TiltedDistances::None => sides.bytes(),
+            },
             Way::Rows => 0,
         }
     }
@@ -133,8 +159,8 @@ impl BodySampler {
             (Way::Upright { sides, .. }, Some(body)) => {
                 sides.layer(kernel, body, grid, k, &mut scratch.upright, out);
             }
-            (Way::Tilted(tilted), Some(body)) => {
-                tilted.sides(kernel, body, grid, k, &mut scratch.tilted, out);
+            (Way::Tilted { sides, .. }, Some(body)) => {
+                sides.sides(kernel, body, grid, k, &mut scratch.tilted, out);
             }
             _ => self.rows(grid, asked, &mut scratch.cuts, out),
         }
@@ -187,10 +213,27 @@ impl BodySampler {
                 }
                 None => {}
             },
-            Way::Tilted(one) => {
-                one.layer(body, grid, known.k, writing, &mut scratch.tilted, out);
-            }
+            Way::Tilted { sides, distances } => match distances {
+                TiltedDistances::Full => {
+                    sides.layer(body, grid, known.k, writing, &mut scratch.tilted, out);
+                }
+                TiltedDistances::Partial(caps) => {
+                    let scratch = &mut scratch.tilted_caps;
+                    caps.layer(sides, (body, grid), known, writing, scratch, out);
+                }
+                TiltedDistances::None => {}
+            },
             Way::Rows => {}
+        }
+    }
+}
+
+impl TiltedDistances {
+    fn new(wanted: Option<&Revolved>, grid: &GridSpec) -> Self {
+        match wanted {
+            Some(body) if *body.turn() == Turn::Full => Self::Full,
+            Some(body) => TiltedCaps::new(body, grid).map_or(Self::None, Self::Partial),
+            None => Self::None,
         }
     }
 }

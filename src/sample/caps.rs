@@ -29,11 +29,11 @@ const FAR: f64 = 1e16;
 const NARROW: f64 = 1e-12;
 /// Share of the least spacing within which a point may be on either side of a cap's plane: some tens of roundings of
 /// a place 65 000 cells away.
-const GUARD: f64 = 1e-9;
+pub(super) const GUARD: f64 = 1e-9;
 /// Least sine of half a turn above 180 degrees. Near a full turn s is small beside the axis, too, where the guard
 /// must not hide that a voxel is in the wedge: it does so up to GUARD / sine from the axis, where S and E differ by
 /// twice that, a hundredth of what they may err by.
-const LEAST_SINE: f64 = 2e-3;
+pub(super) const LEAST_SINE: f64 = 2e-3;
 
 /// Rows of a grid around the axis of a wedge.
 #[derive(Debug)]
@@ -147,17 +147,12 @@ impl CapPlane {
     /// One row.
     pub(super) fn row(&self, j: usize) -> CapRow {
         let y = self.y[j];
-        CapRow {
-            along: self.along.map(|d| {
-                let [x, y] = [d[0], d[1] * y].map(|v| v * self.per_length);
-                [x, y + self.axis_place]
-            }),
-            across: self.across.map(|d| [d[0], d[1] * y]),
-            #[allow(clippy::cast_possible_truncation, reason = "1 or -1")]
-            sense: self.sense as f32,
-            #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
-            guard: self.guard as f32,
-        }
+        let along = self.along.map(|d| {
+            let [x, y] = [d[0], d[1] * y].map(|v| v * self.per_length);
+            [x, y + self.axis_place]
+        });
+        let across = self.across.map(|d| [d[0], d[1] * y]);
+        CapRow::new(along, across, self.sense, self.guard)
     }
 
     /// The voxels of a row along x, whole groups of them.
@@ -200,6 +195,21 @@ fn larger(of: [[f64; 2]; 2], x: f64) -> f64 {
 }
 
 impl CapRow {
+    /// A row whose voxels are at `x`: for either cap, coefficients of x and what is added, in places along it and in
+    /// scene units across.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "1 or -1, and a bound with room"
+    )]
+    pub(super) fn new(along: [[f64; 2]; 2], across: [[f64; 2]; 2], sense: f64, guard: f64) -> Self {
+        Self {
+            along,
+            across,
+            sense: sense as f32,
+            guard: guard as f32,
+        }
+    }
+
     /// Place along the nearer cap of the voxel at `x`.
     #[inline(always)]
     pub(super) fn place(&self, x: f64) -> u32 {

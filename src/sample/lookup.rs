@@ -12,6 +12,7 @@
 //!
 //! The plain loops are the definition; compiled for wider lanes they do the same operations in the same order.
 
+use super::caps::CapRow;
 use crate::math::{Kernel, root};
 use crate::region::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};
 #[cfg(target_arch = "x86_64")]
@@ -41,9 +42,11 @@ pub(super) struct LayerView {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Points<'a> {
     /// The voxels of a row, from the first on.
-    Row(f64),
+    Row(LayerView, f64),
     /// Points of the layer: i and j, whole or not.
-    Any(&'a [f64], &'a [f64]),
+    Any(LayerView, &'a [f64], &'a [f64]),
+    /// Voxels i of a row as its nearer cap sees them; their heights, at 0 and the change along i.
+    Caps(CapRow, &'a [f64], [f64; 2]),
 }
 
 /// What one thread reuses.
@@ -83,7 +86,6 @@ pub(super) struct Marks {
 pub(super) fn look_up(
     kernel: Kernel,
     table: &CellTable,
-    view: LayerView,
     points: Points<'_>,
     least: f32,
     lanes: &mut Lanes,
@@ -91,7 +93,6 @@ pub(super) fn look_up(
 ) {
     let job = LookUp {
         table,
-        view,
         points,
         least,
         lanes,
@@ -115,9 +116,26 @@ pub(super) fn look_up_ridge(
     [i, j]: [f64; 2],
     apart: f32,
 ) -> Option<f32> {
-    let (mut r, mut z, mut tile, mut cell) = ([0], [0], [0], [0]);
-    let (mut ar, mut az) = ([0.0], [0.0]);
+    let (mut r, mut z) = ([0], [0]);
     any_places(&view, [&[i], &[j]], [&mut r, &mut z]);
+    ridge_at(table, [r, z], apart)
+}
+
+/// The same for a voxel as its nearer cap sees it.
+pub(super) fn look_up_cap_ridge(
+    table: &CellTable,
+    (row, x, height): (CapRow, f64, [f64; 2]),
+    apart: f32,
+) -> Option<f32> {
+    let (mut r, mut z) = ([0], [0]);
+    cap_places(row, &[x], height, [&mut r, &mut z]);
+    ridge_at(table, [r, z], apart)
+}
+
+/// The signed distance at a place whose cell has several circles.
+fn ridge_at(table: &CellTable, [r, z]: [[u32; 1]; 2], apart: f32) -> Option<f32> {
+    let (mut tile, mut cell) = ([0], [0]);
+    let (mut ar, mut az) = ([0.0], [0.0]);
     let scale = Scale::new(table);
     tile_numbers(&scale, [&r, &z], &mut tile);
     tile[0] = table.tiles().0[tile[0] as usize];
@@ -182,7 +200,6 @@ impl Scale {
 
 struct LookUp<'a> {
     table: &'a CellTable,
-    view: LayerView,
     points: Points<'a>,
     least: f32,
     lanes: &'a mut Lanes,
@@ -247,7 +264,6 @@ impl LookUp<'_> {
     fn run(self, block: &impl Block) {
         let Self {
             table,
-            view,
             points,
             least,
             lanes,
@@ -272,10 +288,14 @@ impl LookUp<'_> {
             let (ar, az) = (&mut ar[..count], &mut az[..count]);
             let first = chunk * CHUNK;
             match points {
-                Points::Row(j) => row_places(&view, j, first, [&mut *r, &mut *z]),
-                Points::Any(i, j) => {
+                Points::Row(view, j) => row_places(&view, j, first, [&mut *r, &mut *z]),
+                Points::Any(view, i, j) => {
                     let range = first..first + count;
                     any_places(&view, [&i[range.clone()], &j[range]], [&mut *r, &mut *z]);
+                }
+                Points::Caps(row, x, height) => {
+                    let x = &x[first..first + count];
+                    cap_places(row, x, height, [&mut *r, &mut *z]);
                 }
             }
             tile_numbers(&scale, [r, z], tile);
@@ -350,6 +370,17 @@ fn any_places(view: &LayerView, [i, j]: [&[f64]; 2], [r, z]: [&mut [u32]; 2]) {
         let y = y[0] + j[n] * y[1];
         r[n] = place(root(x * x + y * y) - base);
         z[n] = place((height[0] + j[n] * height[2]) + i[n] * height[1]);
+    }
+}
+
+/// Places of voxels of a row along their caps.
+#[inline(always)]
+fn cap_places(row: CapRow, x: &[f64], height: [f64; 2], [r, z]: [&mut [u32]; 2]) {
+    let count = x.len();
+    let (r, z) = (&mut r[..count], &mut z[..count]);
+    for n in 0..count {
+        r[n] = row.place(x[n]);
+        z[n] = place(height[0] + x[n] * height[1]);
     }
 }
 

@@ -14,6 +14,8 @@
 //!   lookup      distances from a table of cells, for rows and points of a layer
 //!   blocks      squares of a layer, divided where the surface is near ──> bits
 //!   tilted      ties these to a body and its table
+//!   tilted_caps the same for less than a full turn, with a second table along its caps
+//!   cap_rows    what both kinds of caps do with a row
 //!   wedge       what less than a full turn leaves of a layer
 //!   body        the way of one body
 //!   composite   bits and distances of several
@@ -24,6 +26,7 @@
 mod bits;
 mod blocks;
 mod body;
+mod cap_rows;
 mod caps;
 mod composite;
 mod divided;
@@ -41,6 +44,7 @@ mod rows;
 mod spread;
 mod tally;
 mod tilted;
+mod tilted_caps;
 mod upright;
 mod volume;
 mod wedge;

@@ -24,9 +24,8 @@
 //! 1024 it is 6.2e-5 and 2 ulp are allowed: the sum stays within max(2 ulp, 1e-4 of the least spacing).
 
 use super::bits;
-use super::caps::{
-    CapGroups, CapPlane, CapRow, GROUP, Given, Places, SweptGroups, combined, dispatch,
-};
+use super::cap_rows::{CapLine, CapScratch};
+use super::caps::{CapPlane, Places, combined, dispatch};
 use super::known::Known;
 use super::layer::stored;
 use super::plane::{BLOCK, PLACES, Plane, Radii};
@@ -34,7 +33,7 @@ use super::queue::RowQueue;
 use super::radial::{KnownLayer, Writing};
 use super::spread::spread;
 use crate::grid::GridSpec;
-use crate::math::{Dd, Kernel, Real};
+use crate::math::{Dd, Real};
 use crate::region::{BoundaryPiece, Chain, Extent, MeridianField, RadialTable};
 use crate::solid::{Revolved, signed};
 
@@ -76,23 +75,19 @@ pub(super) struct PartialScratch {
     distances: Vec<f32>,
     marks: Vec<u8>,
     row: Vec<f32>,
-    own: RowScratch,
+    groups: CapScratch,
+    places: PlaceScratch,
     queue: RowQueue,
     /// Values of either table that were mended.
     known_swept: Known,
     known_edges: Known,
 }
 
-/// What a row of voxels takes.
+/// Places of a row along its caps.
 #[derive(Debug, Default)]
-struct RowScratch {
-    inside: Vec<u16>,
-    gaps: Vec<f32>,
-    wanted: Vec<bool>,
-    doubts: Vec<bool>,
+struct PlaceScratch {
     places: Vec<u32>,
     cells: Vec<u32>,
-    edges: Vec<f32>,
     marks: Vec<u8>,
 }
 
@@ -184,7 +179,8 @@ impl PartialSampler {
             distances,
             marks,
             row,
-            own,
+            groups,
+            places,
             queue,
             known_swept,
             known_edges,
@@ -204,7 +200,8 @@ impl PartialSampler {
         let padded = self.caps.x().len();
         distances.resize(padded.max(self.plane.stored().1), 0.0);
         row.resize(padded, 0.0);
-        own.resize(padded);
+        groups.resize(padded);
+        places.resize(padded);
         queue.start(nx);
         let rows = self.plane.len();
         for n in 0..rows {
@@ -215,7 +212,9 @@ impl PartialSampler {
             self.swept_row(&layer, self.plane.radii(n..n + 1), distances, row_marks);
             let twin = self.plane.twin(n);
             for (j, is_twin) in std::iter::once((n, false)).chain(twin.map(|t| (t, true))) {
-                self.row(&layer, j, &distances[..padded], (own, known_edges), row);
+                let distances = &distances[..padded];
+                self.row(&layer, j, distances, (groups, places), row);
+                self.mend_row(&layer, j, distances, (groups, known_edges), row);
                 if !writing.past_caches {
                     out[j * nx..(j + 1) * nx].copy_from_slice(&row[..nx]);
                 } else if is_twin {
@@ -335,122 +334,67 @@ impl PartialSampler {
         distances[nx..].fill(last);
     }
 
-    /// Fills row `j` from its distances to the swept surface.
+    /// Fills row `j` from its distances to the swept surface, but for its doubts.
     fn row(
         &self,
         layer: &Layer<'_>,
         j: usize,
         distances: &[f32],
-        (scratch, known): (&mut RowScratch, &mut Known),
+        (groups, scratch): (&mut CapScratch, &mut PlaceScratch),
         out: &mut [f32],
     ) {
-        let nx = layer.grid.dims()[0];
         let Writing { kernel, band, .. } = layer.writing;
         let row = self.caps.row(j);
-        for (g, bits) in scratch.inside.iter_mut().enumerate() {
-            *bits = bits::sixteen(layer.known.inside, j * nx + g * GROUP);
-        }
+        let x = self.caps.x();
         let band = stored(band);
-        let given = Given {
+        groups.set_inside(layer.known.inside, j * layer.grid.dims()[0]);
+        let line = CapLine {
             row,
-            x: self.caps.x(),
-            inside: &scratch.inside,
+            x,
+            ends: self.caps.ends(),
             swept: distances,
             least: self.near.min(band),
             band,
         };
-        dispatch(
-            kernel,
-            SweptGroups {
-                given,
-                ends: self.caps.ends(),
-                gaps: &mut scratch.gaps,
-                wanted: &mut scratch.wanted,
-                out,
-                doubts: &mut scratch.doubts,
-            },
-        );
-        let groups = scratch.wanted.len();
-        let mut from = 0;
-        while from < groups {
-            if !scratch.wanted[from] {
-                from += 1;
-                continue;
-            }
-            let run = scratch.wanted[from..].iter().take_while(|w| **w).count();
-            let to = from + run;
-            self.caps_run(
-                layer,
+        groups.fill(kernel, line, out, |lanes, edges| {
+            let length = lanes.len();
+            let places = &mut scratch.places[..length];
+            let cells = &mut scratch.cells[..length / BLOCK];
+            dispatch(
                 kernel,
-                given,
-                [from, to],
-                RunScratch {
-                    places: &mut scratch.places,
-                    cells: &mut scratch.cells,
-                    edges: &mut scratch.edges,
-                    marks: &mut scratch.marks,
-                    doubts: &mut scratch.doubts[from..to],
+                Places {
+                    row,
+                    x: &x[lanes],
+                    scattered: self.caps.is_scattered(),
+                    places,
+                    cells,
                 },
-                &mut out[from * GROUP..to * GROUP],
             );
-            from = to;
-        }
-        for g in (0..groups).filter(|g| scratch.doubts[*g]) {
-            for i in g * GROUP..((g + 1) * GROUP).min(nx) {
-                if !(out[i].abs() >= given.least) {
-                    let found = (distances[i], out[i]);
-                    out[i] = self.mended(layer, [i, j], row, found, known);
-                }
-            }
-        }
+            let places = Radii {
+                radii: places,
+                blocks: cells,
+            };
+            let marks = &mut scratch.marks[..length / BLOCK];
+            spread(kernel, places, layer.edges, 0.0, edges, marks);
+        });
     }
 
-    /// Fills a run of groups that caps may be nearest to.
-    fn caps_run(
+    /// Answers the doubts of a row.
+    fn mend_row(
         &self,
         layer: &Layer<'_>,
-        kernel: Kernel,
-        given: Given<'_>,
-        [from, to]: [usize; 2],
-        scratch: RunScratch<'_>,
+        j: usize,
+        distances: &[f32],
+        (groups, known): (&CapScratch, &mut Known),
         out: &mut [f32],
     ) {
-        let lanes = from * GROUP..to * GROUP;
-        let length = lanes.len();
-        let given = Given {
-            x: &given.x[lanes.clone()],
-            inside: &given.inside[from..to],
-            swept: &given.swept[lanes],
-            ..given
-        };
-        let places = &mut scratch.places[..length];
-        let cells = &mut scratch.cells[..length / BLOCK];
-        let edges = &mut scratch.edges[..length];
-        dispatch(
-            kernel,
-            Places {
-                row: given.row,
-                x: given.x,
-                scattered: self.caps.is_scattered(),
-                places,
-                cells,
-            },
-        );
-        let places = Radii {
-            radii: places,
-            blocks: cells,
-        };
-        let marks = &mut scratch.marks[..length / BLOCK];
-        spread(kernel, places, layer.edges, 0.0, edges, marks);
-        dispatch(
-            kernel,
-            CapGroups {
-                given,
-                edges,
-                out,
-                doubts: scratch.doubts,
-            },
-        );
+        let least = self.near.min(stored(layer.writing.band));
+        for i in groups.doubtful(layer.grid.dims()[0]) {
+            if !(out[i].abs() >= least) {
+                let found = (distances[i], out[i]);
+                out[i] = self.mended(layer, [i, j], found, known);
+            }
+        }
     }
 
     /// The value of a voxel from its distance from the swept surface, and from the value that the tables found: not a
@@ -459,14 +403,13 @@ impl PartialSampler {
         &self,
         layer: &Layer<'_>,
         [i, j]: [usize; 2],
-        row: CapRow,
         (swept, found): (f32, f32),
         known_edges: &mut Known,
     ) -> f32 {
         let (grid, known) = (layer.grid, layer.known);
         let inside = bits::get(known.inside, j * grid.dims()[0] + i);
         let value = if found.is_nan() {
-            let x = self.caps.x()[i];
+            let (row, x) = (self.caps.row(j), self.caps.x()[i]);
             let place = row.place(x);
             let edge = known_edges.value(place, || self.edge(layer, place));
             combined(row, x, swept, edge)
@@ -496,26 +439,11 @@ impl PartialSampler {
     }
 }
 
-/// The parts of a row's scratch that a run of groups uses.
-struct RunScratch<'a> {
-    places: &'a mut [u32],
-    cells: &'a mut [u32],
-    edges: &'a mut [f32],
-    marks: &'a mut [u8],
-    doubts: &'a mut [bool],
-}
-
-impl RowScratch {
+impl PlaceScratch {
     /// Makes room for rows of `padded` voxels.
     fn resize(&mut self, padded: usize) {
-        let groups = padded / GROUP;
-        self.inside.resize(groups, 0);
-        self.gaps.resize(groups, 0.0);
-        self.wanted.resize(groups, false);
-        self.doubts.resize(groups, false);
         self.places.resize(padded, 0);
         self.cells.resize(padded / BLOCK, 0);
-        self.edges.resize(padded, 0.0);
         self.marks.resize(padded / BLOCK, 0);
     }
 }

@@ -1,5 +1,6 @@
 //! Membership and signed distances of one body that is turned about any axis, a layer at a time. Of less than a full
-//! turn it is the membership alone: the full turn's within the wedge.
+//! turn it is the membership, the full turn's within the wedge, and the distances to the swept surface, which
+//! [`super::tilted_caps`] joins with those to the caps.
 //!
 //! A voxel's distance depends on its radius and height in the body's frame. One table of small cells over those
 //! ([`CellTable`]) serves the whole grid; rows and points of a layer look their distances up ([`super::lookup`]). What
@@ -33,14 +34,14 @@ use crate::solid::{Revolved, Turn, signed};
 use glam::DVec3;
 
 /// Shares of the least spacing.
-const ARCS: f64 = 1.5e-5;
-const CELLS: f64 = 4.5e-5;
+pub(super) const ARCS: f64 = 1.5e-5;
+pub(super) const CELLS: f64 = 4.5e-5;
 /// Nearer to the surface than this the exact path answers.
-const NEAR: f64 = 2e-4;
+pub(super) const NEAR: f64 = 2e-4;
 /// The most arcs a boundary is replaced by.
-const MOST_ARCS: usize = 20_000;
+pub(super) const MOST_ARCS: usize = 20_000;
 /// Bytes written together past the caches: much more than a line, much less than a cache.
-const TOGETHER: usize = 1 << 16;
+pub(super) const TOGETHER: usize = 1 << 16;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 /// What world coordinates may be rounded by, as a share of the least spacing.
@@ -104,11 +105,7 @@ impl TiltedSampler {
         let along =
             [DVec3::X, DVec3::Y, DVec3::Z].map(|e| frame.vector_to_local(e * spacing).to_array());
         let extent = extent(start, along, grid.dims(), least / scale)?;
-        let steps = |[a, b]: [f64; 2]| (b - a) / extent.cell;
-        #[allow(clippy::cast_precision_loss, reason = "a comparison")]
-        let voxels = grid.voxel_count() as f64;
-        if steps(extent.r) * steps(extent.z) > MOST_PER_VOXEL * voxels + FEW_STEPS {
-            // The exact path answers so few voxels sooner.
+        if !pays(&extent, grid) {
             return None;
         }
         let swept: Vec<_> = (body.boundary().iter())
@@ -192,12 +189,7 @@ impl TiltedSampler {
         }
     }
 
-    /// Whether [`layer`](Self::layer) serves: the distances are those of the full turn.
-    pub(super) fn has_distances(body: &Revolved) -> bool {
-        *body.turn() == Turn::Full
-    }
-
-    /// Fills a layer with signed distances.
+    /// Fills a layer with signed distances of a full turn.
     pub(super) fn layer(
         &self,
         body: &Revolved,
@@ -220,19 +212,9 @@ impl TiltedSampler {
             let count = together.min(ny - first);
             for n in 0..count {
                 let row = &mut scratch.rows[n * nx..n * nx + padded];
-                #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-                let points = Points::Row((first + n) as f64);
-                #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
-                let near = self.near as f32;
-                look_up(
-                    writing.kernel,
-                    &self.table,
-                    view,
-                    points,
-                    near,
-                    &mut scratch.lanes,
-                    (row, &mut scratch.marks),
-                );
+                let lanes = &mut scratch.lanes;
+                let marks = (self.near(), &mut *scratch.marks);
+                self.row(writing.kernel, (view, first + n), lanes, marks, row);
                 let row = &mut row[..nx];
                 let close = &mut scratch.close;
                 self.mend(
@@ -261,6 +243,53 @@ impl TiltedSampler {
             }
             self.settle(body, (grid, k), writing, &mut scratch.close, out);
         }
+    }
+
+    /// Fills row `j`, whole blocks of it, with signed distances of the full turn, NaN where the table has none, and marks
+    /// what is nearer to 0 than `least`.
+    fn row(
+        &self,
+        kernel: Kernel,
+        (view, j): (LayerView, usize),
+        lanes: &mut Lanes,
+        (least, marks): (f32, &mut [Marks]),
+        out: &mut [f32],
+    ) {
+        #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+        let points = Points::Row(view, j as f64);
+        look_up(kernel, &self.table, points, least, lanes, (out, marks));
+    }
+
+    /// Fills row `j` of layer `k`, whole blocks of it, with distances to the swept surface of the full turn, of either
+    /// sign; NaN where neither the table nor the field's leaf has one.
+    pub(super) fn swept_row(
+        &self,
+        kernel: Kernel,
+        [j, k]: [usize; 2],
+        lanes: &mut Lanes,
+        marks: &mut [Marks],
+        out: &mut [f32],
+    ) {
+        let view = self.view(k);
+        // Only what is not a number is told apart here.
+        self.row(kernel, (view, j), lanes, (0.0, marks), out);
+        for (block, mut marks) in (marks.iter().map(|m| m.doubtful)).enumerate() {
+            while marks != 0 {
+                let i = block * LANES + marks.trailing_zeros() as usize;
+                marks &= marks - 1;
+                #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+                let at = [i as f64, j as f64];
+                let ridge = look_up_ridge(&self.table, view, at, self.near());
+                let mended = || Some(stored(self.mended(kernel, view, at)?));
+                out[i] = ridge.or_else(mended).unwrap_or(f32::NAN);
+            }
+        }
+    }
+
+    /// Distances below this are the exact path's.
+    #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
+    fn near(&self) -> f32 {
+        self.near as f32
     }
 
     /// Asks the exact path for the voxels of layer `k` that are left to it.
@@ -303,11 +332,9 @@ impl TiltedSampler {
                 }
                 #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
                 let at = [i as f64, j as f64];
-                #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
-                let near = self.near as f32;
                 let mut size = None;
                 if row[i].is_nan() {
-                    if let Some(distance) = look_up_ridge(&self.table, view, at, near) {
+                    if let Some(distance) = look_up_ridge(&self.table, view, at, self.near()) {
                         row[i] = distance;
                     } else {
                         size = self.mended(kernel, view, at).filter(|d| *d >= self.near);
@@ -365,6 +392,16 @@ fn extent(start: [f64; 3], along: [[f64; 3]; 3], dims: [usize; 3], least: f64) -
     }
     // No voxel is further from the middle of the grid, seen along the axis, than its corners.
     r[0] = (middle[0].hypot(middle[1]) - half).max(0.0);
+    let step = step_for([r, z], least)?;
+    Some(Extent {
+        r: [(r[0] - step).max(0.0), r[1] + step],
+        z: [z[0] - step, z[1] + step],
+        cell: step,
+    })
+}
+
+/// The step of a lattice over these ranges, the least or some times that; `None` where that is too many.
+pub(super) fn step_for([r, z]: [[f64; 2]; 2], least: f64) -> Option<f64> {
     let mut step = least;
     while !((r[1] - r[0]).max(z[1] - z[0]) / step <= MOST_STEPS) {
         step *= 2.0;
@@ -372,11 +409,16 @@ fn extent(start: [f64; 3], along: [[f64; 3]; 3], dims: [usize; 3], least: f64) -
             return None;
         }
     }
-    Some(Extent {
-        r: [(r[0] - step).max(0.0), r[1] + step],
-        z: [z[0] - step, z[1] + step],
-        cell: step,
-    })
+    Some(step)
+}
+
+/// Whether a table over this part of the half-plane is worth its while for so many voxels: the exact path answers few of
+/// them sooner.
+pub(super) fn pays(extent: &Extent, grid: &GridSpec) -> bool {
+    let steps = |[a, b]: [f64; 2]| (b - a) / extent.cell;
+    #[allow(clippy::cast_precision_loss, reason = "a comparison")]
+    let voxels = grid.voxel_count() as f64;
+    steps(extent.r) * steps(extent.z) <= MOST_PER_VOXEL * voxels + FEW_STEPS
 }
 
 #[cfg(test)]

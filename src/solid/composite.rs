@@ -199,7 +199,7 @@ fn over_faces(
         m.max(b.min.abs().max(b.max.abs()).max_element())
     });
     let faces = Faces::new(bodies, terms, reach);
-    let most = if stand_ins { 10 * MOST_WORK } else { MOST_WORK };
+    let most = if stand_ins { 5 * MOST_WORK } else { MOST_WORK };
     let mut panels = integrated(&faces, size, most)?;
     panels.sort_by(|a, b| {
         let key = |p: &Panel| p.sheet.number();

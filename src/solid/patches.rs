@@ -441,7 +441,15 @@ impl Patches {
     pub(super) fn may_meet(&self, stretch: &Stretch, margin: f64) -> bool {
         let Aabb { min, max } = stretch.bounds();
         let margin = margin / self.frame.scale();
-        self.nets.faces.may_touch(min - margin, max + margin)
+        let grown = Aabb {
+            min: min - margin,
+            max: max + margin,
+        };
+        let span = |direction: DVec3| {
+            let [low, high] = stretch.span(direction);
+            [low - margin, high + margin]
+        };
+        self.nets.faces.may_touch(&grown, span)
     }
 
     /// The outer faces: lines of constant first parameter.
@@ -527,6 +535,8 @@ pub(crate) struct FaceLine {
     /// Derivatives of these by the first parameter.
     slopes: SmallVec<[[f64; 4]; 8]>,
     origin: DVec3,
+    /// The unit normal, where it is the same all along.
+    normal: Option<DVec3>,
 }
 
 impl FaceLine {
@@ -557,10 +567,12 @@ impl FaceLine {
             }
             points.push(row[0]);
         }
+        let normal = common_normal(&points, &slopes);
         Some(Self {
             points,
             slopes,
             origin,
+            normal,
         })
     }
 
@@ -614,7 +626,6 @@ impl FaceLine {
         heights.fold(f64::NEG_INFINITY, f64::max) + direction.dot(self.origin)
     }
 
-    /// Length of the control polygon.
     /// The same line in a body's own coordinates.
     pub(super) fn placed(&self, frame: &Similarity) -> Self {
         let turned = |h: &[f64; 4]| {
@@ -625,11 +636,17 @@ impl FaceLine {
             points: self.points.iter().map(turned).collect(),
             slopes: self.slopes.iter().map(turned).collect(),
             origin: frame.to_local(self.origin).point,
+            normal: (self.normal).map(|n| frame.vector_to_local(n).normalize_or_zero()),
         }
     }
 
-    /// The control points of the part between two parameters: it lies in their convex hull.
-    pub(super) fn hull(&self, [a, b]: [f64; 2]) -> SmallVec<[DVec3; 8]> {
+    /// Points in whose convex hull, grown by the length that comes with them, the part between two parameters lies,
+    /// moved by `off` along the normal.
+    pub(super) fn hull(&self, [a, b]: [f64; 2], off: f64) -> (SmallVec<[DVec3; 8]>, f64) {
+        let (by, room) = match self.normal {
+            Some(normal) => (normal * off, 0.0),
+            None => (DVec3::ZERO, off.abs()),
+        };
         let mut row: SmallVec<[[f64; 4]; 8]> = self.points.clone();
         let n = row.len();
         if b < 1.0 {
@@ -647,10 +664,11 @@ impl FaceLine {
                 }
             }
         }
-        let points = row.iter().map(|h| xyz(*h) / h[3] + self.origin);
-        points.collect()
+        let points = row.iter().map(|h| xyz(*h) / h[3] + self.origin + by);
+        (points.collect(), room)
     }
 
+    /// Length of the control polygon.
     fn length(&self) -> f64 {
         let at = |h: &[f64; 4]| xyz(*h) / h[3];
         self.points
@@ -658,6 +676,21 @@ impl FaceLine {
             .map(|w| (at(&w[1]) - at(&w[0])).length())
             .sum()
     }
+}
+
+/// The unit normal of a line whose control points, and those of its slope across, are in one plane with its origin.
+fn common_normal(points: &[[f64; 4]], slopes: &[[f64; 4]]) -> Option<DVec3> {
+    let (h, along) = casteljau(points, 0.5);
+    let (across, _) = casteljau(slopes, 0.5);
+    let x = xyz(h) / h[3];
+    let [across, along] = [across, along].map(|d| xyz(d) - x * d[3]);
+    let normal = across.cross(along).try_normalize()?;
+    let even = |vectors: &[[f64; 4]]| {
+        let size = vectors.iter().map(|v| xyz(*v).length()).fold(0.0, f64::max);
+        let heights = vectors.iter().map(|v| normal.dot(xyz(*v)).abs());
+        heights.fold(0.0, f64::max) <= 4.0 * f64::EPSILON * size
+    };
+    (even(points) && even(slopes)).then_some(normal)
 }
 
 fn xyz(h: [f64; 4]) -> DVec3 {

@@ -57,7 +57,8 @@ impl Stretch<'_> {
     pub(super) fn reach(&self) -> Reach {
         let (path, half) = (self.path, self.half);
         if let Path::Face { line, off } = path {
-            return reach_of_hull(&line.hull(self.range()), off.abs());
+            let (hull, room) = line.hull(self.range(), *off);
+            return reach_of_hull(&hull, room);
         }
         let p = path.at(self.middle);
         let (d, bend) = path.slopes(self.middle);
@@ -88,7 +89,8 @@ impl Stretch<'_> {
             return false;
         };
         if let Path::Face { line, off } = self.path {
-            let (hull, room) = (line.hull(self.range()), off.abs() + margin);
+            let (hull, room) = line.hull(self.range(), *off);
+            let room = room + margin;
             return wedge.directions().iter().any(|d| {
                 let flat = || hull.iter().map(|p| DVec2::new(p.x, p.y));
                 let aside = flat().any(|p| d.perp_dot(p) <= room);
@@ -111,12 +113,12 @@ impl Stretch<'_> {
     pub(super) fn bounds(&self) -> Aabb {
         let range = self.range();
         if let Path::Face { line, off } = self.path {
-            let hull = line.hull(range);
+            let (hull, room) = line.hull(range, *off);
             let ends = |f: fn(DVec3, DVec3) -> DVec3| hull.iter().copied().reduce(f);
             let (min, max) = (ends(DVec3::min), ends(DVec3::max));
             return Aabb {
-                min: min.unwrap_or(DVec3::NEG_INFINITY) - off.abs(),
-                max: max.unwrap_or(DVec3::INFINITY) + off.abs(),
+                min: min.unwrap_or(DVec3::NEG_INFINITY) - room,
+                max: max.unwrap_or(DVec3::INFINITY) + room,
             };
         }
         let furthest =
@@ -126,10 +128,22 @@ impl Stretch<'_> {
             max: furthest(1.0),
         }
     }
+    /// The least and the largest `direction · x` over the stretch; `direction` a unit vector.
+    pub(super) fn span(&self, direction: DVec3) -> [f64; 2] {
+        let range = self.range();
+        if let Path::Face { line, off } = self.path {
+            let (hull, room) = line.hull(range, *off);
+            let heights = hull.iter().map(|p| direction.dot(*p));
+            let low = heights.clone().fold(f64::INFINITY, f64::min);
+            return [low - room, heights.fold(f64::NEG_INFINITY, f64::max) + room];
+        }
+        let furthest = |d: DVec3| self.path.support(d, range);
+        [-furthest(-direction), furthest(direction)]
+    }
 }
 
-/// Bounds of (ρ, z) over the convex hull of points, grown by `off`.
-fn reach_of_hull(hull: &[DVec3], off: f64) -> Reach {
+/// Bounds of (ρ, z) over the convex hull of points, grown by `room`.
+fn reach_of_hull(hull: &[DVec3], room: f64) -> Reach {
     let flat = |p: &DVec3| DVec2::new(p.x, p.y);
     // ρ is convex, and a linear function of the plane along a unit vector is never above it.
     let most = hull.iter().map(|p| flat(p).length()).fold(0.0, f64::max);
@@ -139,8 +153,8 @@ fn reach_of_hull(hull: &[DVec3], off: f64) -> Reach {
     let low = hull.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     let high = hull.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
     Reach {
-        r: [(least - off).max(0.0), most + off],
-        z: [low - off, high + off],
+        r: [(least - room).max(0.0), most + room],
+        z: [low - room, high + room],
     }
 }
 

@@ -43,7 +43,7 @@ impl Revolved {
         match degrees.max() {
             None | Some(0 | 1) => 1,
             Some(2) => 2,
-            Some(_) => 10,
+            Some(_) => 5,
         }
     }
 
