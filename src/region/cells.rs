@@ -26,7 +26,8 @@
 //! Points are in places: fixed-point numbers of *steps*, from the lattice's corner on.
 
 use super::chain::Local;
-use super::field::{Leaf, MOST_RUNS, MeridianField};
+use super::field::MeridianField;
+use super::field_nodes::{Leaf, MOST_RUNS};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -23,6 +23,7 @@ mod distance;
 mod eights;
 mod error;
 mod field;
+mod field_nodes;
 mod moments;
 mod piece;
 mod profile;

@@ -17,7 +17,8 @@
 //! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
 
 use super::chain::Local;
-use super::field::{MOST_RUNS, MeridianField};
+use super::field::MeridianField;
+use super::field_nodes::MOST_RUNS;
 use crate::math::Kernel;
 
 /// Cells whose coefficients lie together.
