@@ -217,6 +217,21 @@ impl CapRow {
     }
 }
 
+impl CapRow {
+    /// Whether all voxels between two places of the row are outside the wedge, further than rounding.
+    pub(super) fn is_outside(&self, ends: [f64; 2]) -> bool {
+        let guard = f64::from(self.guard);
+        let sense = f64::from(self.sense);
+        let outside = |of: [f64; 2]| ends.iter().all(|x| sense * (x * of[0] + of[1]) > guard);
+        // s is the larger of the two, or for more than half a turn the lesser.
+        if sense > 0.0 {
+            self.across.into_iter().any(outside)
+        } else {
+            self.across.into_iter().all(outside)
+        }
+    }
+}
+
 /// A number below 2^32 to the nearest whole one, in a way that lanes have.
 #[inline(always)]
 fn rounded(v: f64) -> u32 {

@@ -41,8 +41,8 @@ pub(super) struct LayerView {
 /// The points whose distances are wanted.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Points<'a> {
-    /// The voxels of a row, from the first on.
-    Row(LayerView, f64),
+    /// The voxels of a row j, from voxel i on.
+    Row(LayerView, f64, usize),
     /// Points of the layer: i and j, whole or not.
     Any(LayerView, &'a [f64], &'a [f64]),
     /// Voxels i of a row as its nearer cap sees them; their heights, at 0 and the change along i.
@@ -288,7 +288,9 @@ impl LookUp<'_> {
             let (ar, az) = (&mut ar[..count], &mut az[..count]);
             let first = chunk * CHUNK;
             match points {
-                Points::Row(view, j) => row_places(&view, j, first, [&mut *r, &mut *z]),
+                Points::Row(view, j, from) => {
+                    row_places(&view, j, from + first, [&mut *r, &mut *z]);
+                }
                 Points::Any(view, i, j) => {
                     let range = first..first + count;
                     any_places(&view, [&i[range.clone()], &j[range]], [&mut *r, &mut *z]);

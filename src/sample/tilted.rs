@@ -214,7 +214,7 @@ impl TiltedSampler {
                 let row = &mut scratch.rows[n * nx..n * nx + padded];
                 let lanes = &mut scratch.lanes;
                 let marks = (self.near(), &mut *scratch.marks);
-                self.row(writing.kernel, (view, first + n), lanes, marks, row);
+                self.row(writing.kernel, (view, [0, first + n]), lanes, marks, row);
                 let row = &mut row[..nx];
                 let close = &mut scratch.close;
                 self.mend(
@@ -245,43 +245,43 @@ impl TiltedSampler {
         }
     }
 
-    /// Fills row `j`, whole blocks of it, with signed distances of the full turn, NaN where the table has none, and marks
-    /// what is nearer to 0 than `least`.
+    /// Fills row `j` from voxel `i` on, whole blocks of it, with signed distances of the full turn, NaN where the table
+    /// has none, and marks what is nearer to 0 than `least`.
     fn row(
         &self,
         kernel: Kernel,
-        (view, j): (LayerView, usize),
+        (view, [i, j]): (LayerView, [usize; 2]),
         lanes: &mut Lanes,
         (least, marks): (f32, &mut [Marks]),
         out: &mut [f32],
     ) {
         #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-        let points = Points::Row(view, j as f64);
+        let points = Points::Row(view, j as f64, i);
         look_up(kernel, &self.table, points, least, lanes, (out, marks));
     }
 
-    /// Fills row `j` of layer `k`, whole blocks of it, with distances to the swept surface of the full turn, of either
-    /// sign; NaN where neither the table nor the field's leaf has one.
+    /// Fills row `j` of layer `k` from voxel `i` on, whole blocks of it, with distances to the swept surface of the full
+    /// turn, of either sign; NaN where neither the table nor the field's leaf has one.
     pub(super) fn swept_row(
         &self,
         kernel: Kernel,
-        [j, k]: [usize; 2],
+        [i, j, k]: [usize; 3],
         lanes: &mut Lanes,
         marks: &mut [Marks],
         out: &mut [f32],
     ) {
         let view = self.view(k);
         // Only what is not a number is told apart here.
-        self.row(kernel, (view, j), lanes, (0.0, marks), out);
+        self.row(kernel, (view, [i, j]), lanes, (0.0, &mut *marks), out);
         for (block, mut marks) in (marks.iter().map(|m| m.doubtful)).enumerate() {
             while marks != 0 {
-                let i = block * LANES + marks.trailing_zeros() as usize;
+                let n = block * LANES + marks.trailing_zeros() as usize;
                 marks &= marks - 1;
                 #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-                let at = [i as f64, j as f64];
+                let at = [(i + n) as f64, j as f64];
                 let ridge = look_up_ridge(&self.table, view, at, self.near());
                 let mended = || Some(stored(self.mended(kernel, view, at)?));
-                out[i] = ridge.or_else(mended).unwrap_or(f32::NAN);
+                out[n] = ridge.or_else(mended).unwrap_or(f32::NAN);
             }
         }
     }

@@ -217,12 +217,23 @@ impl TiltedCaps {
         let k = layer.known.k;
         let nx = layer.grid.dims()[0];
         let kernel = layer.writing.kernel;
-        swept.swept_row(kernel, [j, k], lanes, marks, distances);
+        let (row, height) = self.view(j, k);
+        // Outside the wedge the swept surface does not matter.
+        let outside = |ends: &[f64; 2]| row.is_outside(*ends);
+        for run in self.ends.chunk_by(|a, b| outside(a) == outside(b)) {
+            let from = group_of(run[0][0]) * GROUP;
+            let distances = &mut distances[from..from + run.len() * GROUP];
+            if outside(&run[0]) {
+                distances.fill(f32::INFINITY);
+            } else {
+                let marks = &mut marks[..run.len()];
+                swept.swept_row(kernel, [from, j, k], lanes, marks, distances);
+            }
+        }
         // Lanes beyond the last voxel see what it sees.
         let last = distances[nx - 1];
         distances[nx..].fill(last);
         groups.set_inside(layer.known.inside, j * nx);
-        let (row, height) = self.view(j, k);
         let band = stored(layer.writing.band);
         let line = CapLine {
             row,
@@ -291,6 +302,16 @@ impl TiltedCaps {
         let unit = self.table.step() / self.field.cell();
         stored(self.field.distance(kernel, self.field.leaf(leaf), q) * unit)
     }
+}
+
+/// The group of a voxel's number.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a voxel's number"
+)]
+fn group_of(i: f64) -> usize {
+    i as usize / GROUP
 }
 
 /// The part of the cap's plane in which voxels are that it is nearer to than the other cap, with a margin.
