@@ -231,9 +231,10 @@ impl Sight<'_> {
         let front = self.camera.point(x, y);
         let point = front + self.camera.forward * depth;
         let cut = |p| self.field.cut.map_or(f64::NEG_INFINITY, |c| c.depth(p));
-        if !(cut(point) <= NEAR[1] * pixel)
-            || !(self.field.distance(probe, point).abs() <= NEAR[1] * pixel)
-        {
+        let near = NEAR[1] * pixel;
+        // Half of what is allowed before it: to tell on which side of its own surface a point is takes longest.
+        let before = point - self.camera.forward * (0.5 * near);
+        if !(cut(point) <= near) || !(self.field.distance(probe, before).abs() <= near) {
             return false;
         }
         // As far back as all of the solid.
