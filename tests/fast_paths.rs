@@ -510,6 +510,22 @@ fn every_voxel_of_a_tilted_wedge_is_within_the_bound() {
 }
 
 #[test]
+fn voxels_far_behind_the_caps_of_a_tilted_wedge_are_within_the_bound() {
+    // All but a full turn about grid y, its middle along grid z: rows cross the half-plane between the caps.
+    for angle in [350.0, 359.0, 200.0] {
+        let text = format!(
+            "[[solid]]\nkind = 'cylinder'\nradius = 1\nheight = 2\nangle = {angle:?}\nstart = {:?}\n\
+             axis = {{ origin = [0, -1, 0], direction = [0, 1, 0], x = [0, 0, 1] }}",
+            -0.5 * angle
+        );
+        let scene = scene(&text);
+        let spacing = DVec3::new(0.05, 0.2, 0.1);
+        let grid = GridSpec::new([160, 41, 83], DVec3::new(-4.4, -4.1, -4.15), spacing);
+        compare(&format!("{angle} degrees"), &scene, &grid.expect("a grid"));
+    }
+}
+
+#[test]
 fn tilted_wedges_of_any_size_and_place_are_within_the_bound() {
     for (n, (name, text)) in tilted_wedges().iter().enumerate() {
         let (scale, place) = [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)][n % 3];

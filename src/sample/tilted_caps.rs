@@ -102,7 +102,7 @@ impl TiltedCaps {
         let across = [1.0, -1.0]
             .map(|c| linear(&|v| sense * scale * (c * aside(v) * cos - towards(v) * sin)));
         let z = linear(&|v| v[2]);
-        let extent = extent(along, z, sense, grid.dims(), least / scale, body)?;
+        let extent = extent(along, z, grid.dims(), least / scale)?;
         if !pays(&extent, grid) {
             return None;
         }
@@ -316,14 +316,7 @@ fn group_of(i: f64) -> usize {
 
 /// The part of the cap's plane in which voxels are that it is nearer to than the other cap, with a margin.
 #[allow(clippy::cast_precision_loss, reason = "voxel counts are below 2^31")]
-fn extent(
-    along: [[f64; 4]; 2],
-    z: [f64; 4],
-    sense: f64,
-    dims: [usize; 3],
-    least: f64,
-    body: &Revolved,
-) -> Option<Extent> {
+fn extent(along: [[f64; 4]; 2], z: [f64; 4], dims: [usize; 3], least: f64) -> Option<Extent> {
     let range = |of: [f64; 4]| {
         (0..3).fold([of[0]; 2], |[low, high], c| {
             let by = of[c + 1] * (dims[c] - 1) as f64;
@@ -331,12 +324,8 @@ fn extent(
         })
     };
     let [a, b] = along.map(range);
-    let (mut low, high) = (a[0].max(b[0]), a[1].max(b[1]));
-    if sense < 0.0 {
-        // From outside a wedge of more than half a turn no length is below 0. In the solid a cap is no nearer than
-        // that below 0, and nearer than the swept surface only where that is less than the section's largest radius.
-        low = low.max(-body.bounds().longest_side() / body.frame().scale() - least);
-    }
+    // All that lanes may look up, whether it matters or not: a place outside the lattice would find another's cell.
+    let (low, high) = (a[0].max(b[0]), a[1].max(b[1]));
     let r = [low, high.max(low)];
     let z = range(z);
     let step = step_for([r, z], least)?;
