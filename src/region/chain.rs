@@ -72,7 +72,7 @@ pub(crate) struct Joint {
 }
 
 /// A signed distance with its derivatives.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Local {
     /// The signed distance.
     pub(crate) value: f64,
@@ -227,7 +227,7 @@ impl Chain {
         let f = &self.features[feature as usize];
         let a = minus(q, f.arc.start);
         if f.corner != 0.0 {
-            return a[0].hypot(a[1]);
+            return dot(a, a).sqrt();
         }
         let b = minus(q, f.arc.end);
         if dot(f.arc.from, a) >= 0.0 && dot(f.arc.to, b) <= 0.0 {
@@ -244,7 +244,7 @@ impl Chain {
         let f = &self.features[feature as usize];
         let a = minus(q, f.arc.start);
         if f.corner != 0.0 {
-            let length = a[0].hypot(a[1]).max(f64::MIN_POSITIVE);
+            let length = dot(a, a).sqrt().max(f64::MIN_POSITIVE);
             return Local {
                 value: f.corner * length,
                 gradient: a.map(|c| f.corner * c / length),
@@ -393,30 +393,44 @@ impl Chain {
         jump * (1.0 + 1e-9)
     }
 
-    /// The neighbour of a feature on the way to another that is a few features away.
-    pub(crate) fn towards(&self, feature: u32, to: u32) -> Option<u32> {
-        const REACH: usize = 4;
-        let follow = |step: fn(&Feature) -> u32| {
-            let mut at = feature;
-            for _ in 0..REACH {
-                at = step(&self.features[at as usize]);
-                if at == to {
-                    return true;
-                }
-                if at >= AXIS {
-                    return false;
-                }
-            }
-            false
-        };
+    /// The bend of what a feature is part of, as [`local`](Self::local) has it.
+    #[inline]
+    pub(crate) fn bend(&self, feature: u32, q: [f64; 2]) -> f64 {
         let f = &self.features[feature as usize];
-        if follow(|f| f.after) {
-            Some(f.after)
-        } else if follow(|f| f.before) {
-            Some(f.before)
+        let a = minus(q, f.arc.start);
+        if f.corner != 0.0 {
+            f.corner / dot(a, a).sqrt().max(f64::MIN_POSITIVE)
         } else {
-            None
+            f.arc.curvature / f.arc.offset(a).1.max(f64::MIN_POSITIVE)
         }
+    }
+
+    /// The features after one up to another, at most `most` joints away in either direction.
+    #[inline]
+    pub(crate) fn between(
+        &self,
+        from: u32,
+        to: u32,
+        most: usize,
+    ) -> Option<impl Iterator<Item = u32> + '_> {
+        let step = |at: u32, ahead: bool| {
+            let f = &self.features[at as usize];
+            if ahead { f.after } else { f.before }
+        };
+        let count = |ahead: bool| {
+            let mut at = from;
+            (1..=most).find(|_| {
+                at = if at < AXIS { step(at, ahead) } else { at };
+                at == to
+            })
+        };
+        let ahead = count(true);
+        let steps = ahead.or_else(|| count(false))?;
+        let mut at = from;
+        Some((0..steps).map(move |_| {
+            at = step(at, ahead.is_some());
+            at
+        }))
     }
 
     /// The features of `list`, which rises, in runs that follow each other; `None` where some go round in a ring.

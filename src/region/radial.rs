@@ -113,10 +113,10 @@ impl RadialTable {
                 (from..to).for_each(|k| self.leave_open(k));
                 return;
             }
-            let mut near = row.feet(features.iter().copied(), from);
+            let mut near = row.first_feet(features, from);
             for start in (from..to).step_by(WIDEST) {
                 let end = to.min(start + WIDEST);
-                let far = row.feet(near.iter().map(|f| f.feature), end);
+                let far = row.feet(&near, end);
                 self.span(&row, [start, end], &near, &far);
                 near = far;
             }
@@ -164,15 +164,12 @@ impl RadialTable {
     fn span(&mut self, row: &Row<'_>, [from, to]: [usize; 2], near: &Feet, far: &Feet) {
         let count = to - from;
         let rivals = row.rivals([near, far], [from, to]);
-        if let Some(&[first]) = rivals.as_deref() {
-            self.put(
-                row.field,
-                [from, to],
-                [&near[first].local, &far[first].local],
-            );
+        let ends = |i: usize| [&near.list[i].local, &far.list[i].local];
+        if let Some(Rivals { first, others: 0 }) = rivals {
+            self.put(row.field, [from, to], ends(first));
         } else if count > 1 {
             let middle = from + count / 2;
-            let feet = row.feet(near.iter().map(|f| f.feature), middle);
+            let feet = row.feet(near, middle);
             self.span(row, [from, middle], near, &feet);
             self.span(row, [middle, to], &feet, far);
         } else {
@@ -181,11 +178,12 @@ impl RadialTable {
                 // The distance is the least of theirs, and each is within the tolerance.
                 let start = u32::try_from(self.cubics.len()).unwrap_or(u32::MAX);
                 let length = row.field.cell() * self.scale;
-                for &i in &rivals {
-                    let cubic = self.cubic([&near[i].local, &far[i].local], length);
+                for i in (0..near.count).filter(|i| rivals.has(*i)) {
+                    let cubic = self.cubic(ends(i), length);
                     self.cubics.push(cubic);
                 }
-                self.ridges[from] = [start, u32::try_from(rivals.len()).unwrap_or(0)];
+                let count = u32::try_from(self.cubics.len()).unwrap_or(u32::MAX) - start;
+                self.ridges[from] = [start, count];
             }
         }
     }
@@ -243,16 +241,31 @@ impl RadialTable {
 }
 
 /// The nearest feature of a run, with its distance.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Foot {
     feature: u32,
     local: Local,
 }
 
-type Feet = smallvec::SmallVec<[Foot; MOST_RUNS]>;
+/// Those of a leaf's runs.
+#[derive(Debug, Clone, Copy, Default)]
+struct Feet {
+    list: [Foot; MOST_RUNS],
+    count: usize,
+}
 
-/// Numbers of runs.
-type Rivals = smallvec::SmallVec<[usize; MOST_RUNS]>;
+/// Runs that may be nearest: the first by its number, the others as bits.
+#[derive(Debug, Clone, Copy)]
+struct Rivals {
+    first: usize,
+    others: u32,
+}
+
+impl Rivals {
+    fn has(self, run: usize) -> bool {
+        run == self.first || self.others >> run & 1 != 0
+    }
+}
 
 impl Foot {
     #[inline]
@@ -262,6 +275,12 @@ impl Foot {
             feature,
             local: field.chain().local(feature, q),
         }
+    }
+}
+
+impl Feet {
+    fn all(&self) -> &[Foot] {
+        &self.list[..self.count]
     }
 }
 
@@ -281,10 +300,28 @@ impl Row<'_> {
         [r, self.z]
     }
 
-    /// The feet of node `k`, from those of another point of the leaf.
-    fn feet(&self, runs: impl Iterator<Item = u32>, k: usize) -> Feet {
+    /// The feet of node `k`, from a feature of each run.
+    fn first_feet(&self, features: &[u32], k: usize) -> Feet {
         let q = self.node(k);
-        runs.map(|from| Foot::new(self.field, from, q)).collect()
+        let mut feet = Feet {
+            count: features.len(),
+            ..Feet::default()
+        };
+        for (foot, &from) in feet.list.iter_mut().zip(features) {
+            *foot = Foot::new(self.field, from, q);
+        }
+        feet
+    }
+
+    /// The feet of node `k`, from those of another point of the leaf.
+    #[inline]
+    fn feet(&self, known: &Feet, k: usize) -> Feet {
+        let q = self.node(k);
+        let mut feet = *known;
+        for foot in &mut feet.list[..known.count] {
+            *foot = Foot::new(self.field, foot.feature, q);
+        }
+        feet
     }
 
     /// The runs that may be nearest between two nodes; `None` where the cubic of one of them may err by more than the
@@ -293,35 +330,53 @@ impl Row<'_> {
     /// The differences to the others are linear but for the bends, where no other surface is crossed: they keep their
     /// sign where they have it at both ends by more than those. What the arcs err by is added: the sign of the distance
     /// is that of the surface that is nearer, not of its arc.
+    #[inline]
     fn rivals(&self, [near, far]: [&Feet; 2], [from, to]: [usize; 2]) -> Option<Rivals> {
         #[allow(clippy::cast_precision_loss, reason = "a small count")]
         let h = (to - from) as f64 * self.field.cell();
         let q = self.node(to);
+        let passage = |i: usize| Passage::new(self.field, [&near.list[i], &far.list[i]], q, h);
+        let good = |p: &Option<Passage>| p.as_ref().is_some_and(|p| p.error(h) <= self.tolerance);
+        let alone = Rivals {
+            first: 0,
+            others: 0,
+        };
+        if near.count == 1 {
+            return good(&passage(0)).then_some(alone);
+        }
         let size = |f: &Foot| f.local.value.abs();
-        let passages: smallvec::SmallVec<[Option<Passage>; MOST_RUNS]> = (near.iter().zip(far))
-            .map(|(a, b)| Passage::new(self.field, [a, b], q, h))
-            .collect();
-        let first = (1..near.len()).fold(0, |m, i| {
-            if size(&near[i]) < size(&near[m]) {
+        let first = (1..near.count).fold(0, |m, i| {
+            if size(&near.list[i]) < size(&near.list[m]) {
                 i
             } else {
                 m
             }
         });
-        let bend = |i: usize| passages[i].as_ref().map_or(f64::INFINITY, |p| p.bend);
-        let own = bend(first);
-        let rivals = (0..near.len()).filter(|&i| {
-            let gap = |feet: &Feet| size(&feet[i]) - size(&feet[first]);
-            let bent = h * (bend(i) + own);
-            let clear = near[i].local.value * far[i].local.value > 0.0
+        let own = passage(first);
+        if !good(&own) {
+            return None;
+        }
+        let bend = |p: &Option<Passage>| p.as_ref().map_or(f64::INFINITY, |p| p.bend);
+        let own = bend(&own);
+        let mut rivals = Rivals { first, ..alone };
+        for (i, (a, b)) in near.all().iter().zip(far.all()).enumerate() {
+            if i == first {
+                continue;
+            }
+            let gap = |f: &Foot, feet: &Feet| size(f) - size(&feet.list[first]);
+            let passage = passage(i);
+            let bent = h * (bend(&passage) + own);
+            let clear = a.local.value * b.local.value > 0.0
                 && bent <= BENT
-                && gap(near).min(gap(far)) > 0.25 * h * bent + self.field.chain().margin();
-            i == first || !clear
-        });
-        let rivals: Rivals = rivals.collect();
-        let good =
-            |i: &usize| (passages[*i].as_ref()).is_some_and(|p| p.error(h) <= self.tolerance);
-        rivals.iter().all(good).then_some(rivals)
+                && gap(a, near).min(gap(b, far)) > 0.25 * h * bent + self.field.chain().margin();
+            if !clear {
+                rivals.others |= 1 << i;
+                if !good(&passage) {
+                    return None;
+                }
+            }
+        }
+        Some(rivals)
     }
 }
 
@@ -346,10 +401,9 @@ impl Passage {
             return Some(found);
         }
         let chain = field.chain();
-        let (mut feature, mut last) = (near.feature, chain.local(near.feature, q).bend);
-        for _ in 0..MOST_JOINTS {
-            feature = chain.towards(feature, far.feature)?;
-            let bend = chain.local(feature, q).bend;
+        let mut last = chain.bend(near.feature, q);
+        for feature in chain.between(near.feature, far.feature, MOST_JOINTS)? {
+            let bend = chain.bend(feature, q);
             let (difference, widest) = ((bend - last).abs(), bend.abs().max(last.abs()));
             found.bend = found.bend.max(widest);
             // Else they are parts of one circle.
@@ -357,21 +411,19 @@ impl Passage {
                 // Both bends are taken at the far end; on the way from the joint they drift by b² h each, which
                 // cancels but for their difference, and by terms in b³.
                 let b = widest / (1.0 - BENT);
-                found.jumps[0] += difference * (1.0 + 3.0 * h * b) + 6.0 * h * h * b.powi(3);
-                found.jumps[1] += 2.4 * b * difference + 24.0 * h * b.powi(3);
-            }
-            if feature == far.feature {
-                return Some(found);
+                let drift = h * b * b * b;
+                found.jumps[0] += difference * (1.0 + 3.0 * h * b) + 6.0 * h * drift;
+                found.jumps[1] += 2.4 * b * difference + 24.0 * drift;
             }
             last = bend;
         }
-        None
+        Some(found)
     }
 
     /// A bound on the error of the cubic over a stretch of length `h`.
     fn error(&self, h: f64) -> f64 {
         let [second, third] = self.jumps;
-        smooth_error(h, self.bend) + h * h * second / 60.0 + h.powi(3) * third / 192.0
+        smooth_error(h, self.bend) + h * h * (second / 60.0 + h * third / 192.0)
     }
 }
 
@@ -381,8 +433,8 @@ fn smooth_error(h: f64, bend: f64) -> f64 {
         return f64::INFINITY;
     }
     // The centre of curvature may be nearer by the stretch's length.
-    let b = bend / (1.0 - bend * h);
-    (h * b).powi(3) * h / 128.0
+    let hb = h * bend / (1.0 - bend * h);
+    hb * hb * hb * h / 128.0
 }
 
 #[cfg(test)]

@@ -158,7 +158,7 @@ impl Composite<'_> {
                 inside: &layer.inside,
             };
             let writing = Writing {
-                past_caches: false,
+                stream: None,
                 ..writing
             };
             sampler.distances(self.grid, own, writing, scratch, &mut layer.distances);

@@ -4,7 +4,7 @@ use super::bits::{self, SideBits};
 use super::body::{Asked, BodySampler, BodyScratch};
 use super::composite::{Composite, CompositeScratch, Limits};
 use super::fraction::FractionSampler;
-use super::memory::expand_past_caches;
+use super::memory::Stream;
 use super::radial::{KnownLayer, Writing};
 use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
@@ -113,6 +113,13 @@ pub(super) struct LayerScratch {
     inside: Vec<u64>,
     body: BodyScratch,
     composite: CompositeScratch,
+}
+
+/// What one thread reuses that fills layers of a large buffer.
+#[derive(Debug)]
+pub(super) struct Filler {
+    scratch: LayerScratch,
+    stream: Stream,
 }
 
 /// Surfaces that tell the materials of a composite apart: those of its bodies and, where parts
@@ -252,7 +259,7 @@ impl<'a> LayerSampler<'a> {
         bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
         let measured = self.selection.sdf && self.fills_distance();
         if measured {
-            self.find_distances(k, scratch, &mut out.sdf, false);
+            self.find_distances(k, scratch, &mut out.sdf, None);
             self.count_certainty(k, scratch, &out.sdf, &mut out.tally.certainty);
         }
         self.rows(k, self.selection.sdf && !measured, out);
@@ -281,13 +288,13 @@ impl<'a> LayerSampler<'a> {
         k: usize,
         scratch: &mut LayerScratch,
         out: &mut [f32],
-        past_caches: bool,
+        stream: Option<&Stream>,
     ) {
         let writing = Writing {
             kernel: self.kernel,
             cancel: self.cancel,
             band: self.band(),
-            past_caches,
+            stream,
         };
         let LayerScratch {
             inside,
@@ -363,25 +370,33 @@ impl<'a> LayerSampler<'a> {
         }
     }
 
+    /// What a thread needs that fills layers of a large buffer.
+    pub(super) fn filler(&self) -> Filler {
+        Filler {
+            scratch: LayerScratch::default(),
+            stream: Stream::new(self.kernel),
+        }
+    }
+
     /// Fills one layer of occupancy in a large buffer.
-    pub(super) fn occupancy_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u8]) {
-        self.find_sides(k, scratch);
-        expand_past_caches(self.kernel, &scratch.inside, out);
+    pub(super) fn occupancy_into(&self, k: usize, with: &mut Filler, out: &mut [u8]) {
+        self.find_sides(k, &mut with.scratch);
+        with.stream.expand(&with.scratch.inside, out);
     }
 
     /// Fills one layer of occupancy as bits.
-    pub(super) fn bits_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [u64]) {
-        self.find_sides(k, scratch);
-        out.copy_from_slice(&scratch.inside);
+    pub(super) fn bits_into(&self, k: usize, with: &mut Filler, out: &mut [u64]) {
+        self.find_sides(k, &mut with.scratch);
+        out.copy_from_slice(&with.scratch.inside);
     }
 
     /// Fills one layer of distances in a large buffer.
-    pub(super) fn distance_into(&self, k: usize, scratch: &mut LayerScratch, out: &mut [f32]) {
+    pub(super) fn distance_into(&self, k: usize, with: &mut Filler, out: &mut [f32]) {
         let single = self.single.map(|single| &self.bodies[single]);
         if single.is_none_or(BodySampler::distances_need_sides) {
-            self.find_sides(k, scratch);
+            self.find_sides(k, &mut with.scratch);
         }
-        self.find_distances(k, scratch, out, true);
+        self.find_distances(k, &mut with.scratch, out, Some(&with.stream));
     }
 }
 

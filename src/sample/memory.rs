@@ -13,75 +13,63 @@
 use super::bits;
 use crate::math::{Kernel, SimdLevel};
 
-/// Copies bytes with stores that go past the caches, where the kernel's lanes have such.
-///
-/// # Panics
-/// When the lengths differ.
-pub(crate) fn copy_past_caches(kernel: Kernel, from: &[u8], to: &mut [u8]) {
-    assert_eq!(from.len(), to.len(), "the bytes to copy fill the buffer");
-    #[cfg(target_arch = "x86_64")]
-    match kernel.level() {
-        // SAFETY: the level says that this machine has AVX-512F.
-        SimdLevel::Avx512 => return unsafe { x86::copy_512(from, to) },
-        // SAFETY: the level says that this machine has AVX2, and so AVX.
-        SimdLevel::Avx2 => return unsafe { x86::copy_256(from, to) },
-        SimdLevel::Scalar | SimdLevel::Auto => {}
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = kernel;
-    to.copy_from_slice(from);
+/// Stores that go past the caches, where the kernel's lanes have such. They may be seen late by other threads: not
+/// after the stream is dropped.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    kernel: Kernel,
 }
 
-/// Values in their order, in parts that stores like.
-pub(crate) trait Lines {
-    /// The next value.
-    fn value(&mut self) -> f32;
+impl Stream {
+    /// A stream with the stores that `kernel` has.
+    pub(crate) fn new(kernel: Kernel) -> Self {
+        Self { kernel }
+    }
 
-    /// The next 16 values.
-    fn line(&mut self) -> [f32; 16];
+    /// Copies bytes.
+    ///
+    /// # Panics
+    /// When the lengths differ.
+    pub(crate) fn copy(&self, from: &[u8], to: &mut [u8]) {
+        assert_eq!(from.len(), to.len(), "the bytes to copy fill the buffer");
+        #[cfg(target_arch = "x86_64")]
+        match self.kernel.level() {
+            // SAFETY: the level says that this machine has AVX-512F.
+            SimdLevel::Avx512 => return unsafe { x86::copy_512(from, to) },
+            // SAFETY: the level says that this machine has AVX2, and so AVX.
+            SimdLevel::Avx2 => return unsafe { x86::copy_256(from, to) },
+            SimdLevel::Scalar | SimdLevel::Auto => {}
+        }
+        to.copy_from_slice(from);
+    }
+
+    /// Writes one byte, 0 or 1, for each bit.
+    ///
+    /// # Panics
+    /// When there are more bytes than bits.
+    pub(crate) fn expand(&self, words: &[u64], to: &mut [u8]) {
+        assert!(to.len() <= 64 * words.len(), "a bit for each byte");
+        #[cfg(target_arch = "x86_64")]
+        if self.kernel.level() == SimdLevel::Avx512 {
+            // SAFETY: the level says that this machine has AVX-512F and AVX-512BW.
+            return unsafe { x86::expand_512(words, to) };
+        }
+        /// Bytes expanded together: some lines, and few enough to stay in the nearest cache.
+        const PART: usize = 1 << 14;
+        let mut bytes = [0; PART];
+        for (words, to) in words.chunks(PART / 64).zip(to.chunks_mut(PART)) {
+            let bytes = &mut bytes[..to.len()];
+            bits::expand(self.kernel, words, bytes);
+            self.copy(bytes, to);
+        }
+    }
 }
 
-/// Fills a buffer with values, with stores that go past the caches where the kernel's lanes have such.
-pub(crate) fn write_past_caches(kernel: Kernel, from: &mut impl Lines, to: &mut [f32]) {
-    #[cfg(target_arch = "x86_64")]
-    match kernel.level() {
-        // SAFETY: the level says that this machine has AVX-512F.
-        SimdLevel::Avx512 => return unsafe { x86::write_512(from, to) },
-        // SAFETY: the level says that this machine has AVX2, and so AVX.
-        SimdLevel::Avx2 => return unsafe { x86::write_256(from, to) },
-        SimdLevel::Scalar | SimdLevel::Auto => {}
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = kernel;
-    write(from, to);
-}
-
-/// Fills a buffer with values.
-pub(crate) fn write(from: &mut impl Lines, to: &mut [f32]) {
-    let (lines, rest) = to.as_chunks_mut::<16>();
-    for line in lines {
-        *line = from.line();
-    }
-    for value in rest {
-        *value = from.value();
-    }
-}
-
-/// Writes one byte, 0 or 1, for each bit, past the caches where the kernel's lanes have such stores.
-pub(crate) fn expand_past_caches(kernel: Kernel, words: &[u64], to: &mut [u8]) {
-    assert!(to.len() <= 64 * words.len(), "a bit for each byte");
-    #[cfg(target_arch = "x86_64")]
-    if kernel.level() == SimdLevel::Avx512 {
-        // SAFETY: the level says that this machine has AVX-512F and AVX-512BW.
-        return unsafe { x86::expand_512(words, to) };
-    }
-    /// Bytes expanded together: some lines, and few enough to stay in the nearest cache.
-    const PART: usize = 1 << 14;
-    let mut bytes = [0; PART];
-    for (words, to) in words.chunks(PART / 64).zip(to.chunks_mut(PART)) {
-        let bytes = &mut bytes[..to.len()];
-        bits::expand(kernel, words, bytes);
-        copy_past_caches(kernel, bytes, to);
+impl Drop for Stream {
+    /// Whoever is told that a buffer is filled sees it so.
+    fn drop(&mut self) {
+        #[cfg(target_arch = "x86_64")]
+        x86::fence();
     }
 }
 
@@ -119,10 +107,15 @@ pub(crate) fn advise_large_pages<T>(buffer: &mut [T]) {
 mod x86 {
     use super::super::bits;
     use std::arch::x86_64::{
-        __m256i, __m512i, _mm_sfence, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_stream_ps,
-        _mm256_stream_si256, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_maskz_set1_epi8,
-        _mm512_stream_ps, _mm512_stream_si512,
+        __m256i, __m512i, _mm_sfence, _mm256_loadu_si256, _mm256_stream_si256, _mm512_loadu_si512,
+        _mm512_maskz_set1_epi8, _mm512_stream_si512,
     };
+
+    /// Waits until all stores before can be seen.
+    pub(super) fn fence() {
+        // SAFETY: the fence is part of SSE, which every machine of this kind has.
+        unsafe { _mm_sfence() };
+    }
 
     /// The part of `to` that is aligned for stores of `N` bytes, with the rest before and after it.
     fn aligned<const N: usize>(to: &mut [u8]) -> [usize; 2] {
@@ -148,60 +141,6 @@ mod x86 {
                 );
             }
         }
-        // Whoever is told that the buffer is filled sees it so.
-        _mm_sfence();
-    }
-
-    /// The values before the first aligned line, and the lines; the rest follows them.
-    fn split(to: &mut [f32]) -> (&mut [f32], &mut [[f32; 16]], &mut [f32]) {
-        let head = to.as_ptr().align_offset(64).min(to.len());
-        let (head, to) = to.split_at_mut(head);
-        let (lines, tail) = to.as_chunks_mut::<16>();
-        (head, lines, tail)
-    }
-
-    /// # Safety
-    /// The machine must have AVX-512F.
-    #[target_feature(enable = "avx512f")]
-    pub(super) unsafe fn write_512(from: &mut impl super::Lines, to: &mut [f32]) {
-        let (head, lines, tail) = split(to);
-        for value in head {
-            *value = from.value();
-        }
-        for line in lines {
-            let values = from.line();
-            // SAFETY: both are 64 bytes long, and `line` is aligned to 64 bytes: the lines start so.
-            unsafe {
-                _mm512_stream_ps(line.as_mut_ptr(), _mm512_loadu_ps(values.as_ptr()));
-            }
-        }
-        for value in tail {
-            *value = from.value();
-        }
-        _mm_sfence();
-    }
-
-    /// # Safety
-    /// The machine must have AVX.
-    #[target_feature(enable = "avx")]
-    pub(super) unsafe fn write_256(from: &mut impl super::Lines, to: &mut [f32]) {
-        let (head, lines, tail) = split(to);
-        for value in head {
-            *value = from.value();
-        }
-        for line in lines {
-            let values = from.line();
-            // SAFETY: halves of 32 bytes each, those of `line` aligned to 32 bytes as above.
-            unsafe {
-                let (a, b) = (values.as_ptr(), line.as_mut_ptr());
-                _mm256_stream_ps(b, _mm256_loadu_ps(a));
-                _mm256_stream_ps(b.add(8), _mm256_loadu_ps(a.add(8)));
-            }
-        }
-        for value in tail {
-            *value = from.value();
-        }
-        _mm_sfence();
     }
 
     /// The 64 bits from bit `at` on; those beyond the last word are 0.
@@ -232,7 +171,6 @@ mod x86 {
             // SAFETY: `b` is 64 bytes long and aligned to as many: the slice starts so, and so does every chunk.
             unsafe { _mm512_stream_si512(b.as_mut_ptr().cast::<__m512i>(), ones) };
         }
-        _mm_sfence();
     }
 
     /// # Safety
@@ -252,7 +190,6 @@ mod x86 {
                 );
             }
         }
-        _mm_sfence();
     }
 }
 
@@ -268,38 +205,9 @@ mod tests {
             for start in [0, 1, 31, 32, 63, 64, 65] {
                 for length in [0, 1, 31, 64, 65, 200, 700] {
                     let mut to = vec![7_u8; 900];
-                    copy_past_caches(kernel, &from[3..3 + length], &mut to[start..start + length]);
+                    Stream::new(kernel).copy(&from[3..3 + length], &mut to[start..start + length]);
                     let mut twin = vec![7_u8; 900];
                     twin[start..start + length].copy_from_slice(&from[3..3 + length]);
-                    assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());
-                }
-            }
-        }
-    }
-
-    /// Counts.
-    struct Count(u16);
-
-    impl Lines for Count {
-        fn value(&mut self) -> f32 {
-            self.0 += 1;
-            f32::from(self.0)
-        }
-
-        fn line(&mut self) -> [f32; 16] {
-            std::array::from_fn(|_| self.value())
-        }
-    }
-
-    #[test]
-    fn streamed_values_are_those_written() {
-        for kernel in every_kernel() {
-            for start in [0, 1, 7, 15, 16, 17] {
-                for length in [0, 1, 15, 16, 50, 200] {
-                    let mut to = vec![7.0_f32; 300];
-                    write_past_caches(kernel, &mut Count(3), &mut to[start..start + length]);
-                    let mut twin = vec![7.0_f32; 300];
-                    write(&mut Count(3), &mut twin[start..start + length]);
                     assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());
                 }
             }
@@ -315,7 +223,7 @@ mod tests {
             for start in [0, 1, 31, 63, 64] {
                 for length in [0, 1, 63, 64, 65, 200, 19 * 64] {
                     let mut to = vec![7_u8; 1400];
-                    expand_past_caches(kernel, &words, &mut to[start..start + length]);
+                    Stream::new(kernel).expand(&words, &mut to[start..start + length]);
                     let mut twin = vec![7_u8; 1400];
                     bits::expand(kernel, &words, &mut twin[start..start + length]);
                     assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());

@@ -35,7 +35,6 @@ mod known;
 mod layer;
 mod lookup;
 mod memory;
-mod mirror;
 mod partial;
 mod plane;
 mod queue;

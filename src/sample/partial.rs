@@ -215,7 +215,7 @@ impl PartialSampler {
                 let distances = &distances[..padded];
                 self.row(&layer, j, distances, (groups, places), row);
                 self.mend_row(&layer, j, distances, (groups, known_edges), row);
-                if !writing.past_caches {
+                if writing.stream.is_none() {
                     out[j * nx..(j + 1) * nx].copy_from_slice(&row[..nx]);
                 } else if is_twin {
                     queue.push_behind(&row[..nx]);
@@ -223,8 +223,10 @@ impl PartialSampler {
                     queue.push_ahead(&row[..nx]);
                 }
             }
-            if writing.past_caches && (queue.is_full() || n + 1 == rows) {
-                queue.write(writing.kernel, out);
+            if let Some(stream) = writing.stream
+                && (queue.is_full() || n + 1 == rows)
+            {
+                queue.write(stream, out);
             }
         }
     }

@@ -3,8 +3,7 @@
 //! Rows come in pairs that mirror each other: one from the first row upwards, the other from the last downwards. Each
 //! kind waits in a buffer of its own until that is long enough to be worth the stores that go past the caches.
 
-use super::memory::copy_past_caches;
-use crate::math::Kernel;
+use super::memory::Stream;
 
 /// Bytes written together: much more than a line, much less than a cache.
 const TOGETHER: usize = 1 << 16;
@@ -52,7 +51,7 @@ impl RowQueue {
     }
 
     /// Writes what waits to its rows of a layer.
-    pub(super) fn write(&mut self, kernel: Kernel, layer: &mut [f32]) {
+    pub(super) fn write(&mut self, stream: &Stream, layer: &mut [f32]) {
         let width = self.width;
         let rows = layer.len() / width;
         let [ahead, behind] = self.waiting;
@@ -64,11 +63,7 @@ impl RowQueue {
         ];
         for (from, row) in parts {
             let to = &mut layer[row * width..row * width + from.len()];
-            copy_past_caches(
-                kernel,
-                bytemuck::cast_slice(from),
-                bytemuck::cast_slice_mut(to),
-            );
+            stream.copy(bytemuck::cast_slice(from), bytemuck::cast_slice_mut(to));
         }
         self.first += ahead;
         self.waiting = [0; 2];
@@ -78,6 +73,7 @@ impl RowQueue {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Kernel;
 
     #[test]
     fn rows_arrive_where_they_belong() {
@@ -95,7 +91,7 @@ mod tests {
                         queue.push_behind(&row(rows - 1 - j));
                     }
                     if queue.is_full() || j + 1 == first_half {
-                        queue.write(Kernel::default(), &mut layer);
+                        queue.write(&Stream::new(Kernel::default()), &mut layer);
                     }
                 }
                 for (j, found) in layer.chunks(WIDTH).enumerate() {

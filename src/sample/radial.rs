@@ -14,15 +14,13 @@
 
 use super::known::Known;
 use super::layer::{Cancel, stored};
-use super::memory::{self, write_past_caches};
-use super::mirror::{MirroredRows, Parts};
+use super::memory::Stream;
 use super::plane::{BLOCK, PLACES, Plane};
-use super::spread::spread;
+use super::spread::spread_rows;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real, Side};
 use crate::region::{Chain, Extent, MeridianField, RadialTable};
 use crate::solid::{LayerCuts, Revolved, Ring, Turn, signed};
-use std::ops::Range;
 
 /// Shares of the least spacing.
 const ARCS: f64 = 2.5e-5;
@@ -33,8 +31,8 @@ const NEAR: f64 = 2e-4;
 const WIDEST: f64 = 1.25;
 /// The most arcs a boundary is replaced by.
 const MOST_ARCS: usize = 20_000;
-/// Bytes written together past the caches: much more than a line, much less than a cache.
-const TOGETHER: usize = 1 << 14;
+/// Bytes written together past the caches: much more than a line, less than the nearest cache.
+const TOGETHER: usize = 1 << 13;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 
@@ -53,8 +51,9 @@ pub(super) struct RadialSampler {
 #[derive(Debug, Default)]
 pub(super) struct RadialScratch {
     table: RadialTable,
-    /// The stored parts of some rows.
-    parts: Vec<f32>,
+    /// Some rows, and those in the opposite order.
+    rows: Vec<f32>,
+    reversed: Vec<f32>,
     doubts: Vec<u8>,
     /// Voxels of those rows whose sign the exact path tells.
     close: Vec<[usize; 2]>,
@@ -77,8 +76,18 @@ pub(super) struct Writing<'a> {
     pub(super) cancel: Option<Cancel<'a>>,
     /// Distances are clamped to ± this.
     pub(super) band: f64,
-    /// Whether the layer is large and not read soon.
-    pub(super) past_caches: bool,
+    /// What a layer is written with that is large and not read soon.
+    pub(super) stream: Option<&'a Stream>,
+}
+
+impl Writing<'_> {
+    /// Writes values to their place in a layer.
+    pub(super) fn put(&self, from: &[f32], to: &mut [f32]) {
+        match self.stream {
+            Some(stream) => stream.copy(bytemuck::cast_slice(from), bytemuck::cast_slice_mut(to)),
+            None => to.copy_from_slice(from),
+        }
+    }
 }
 
 impl RadialSampler {
@@ -143,26 +152,26 @@ impl RadialSampler {
         scratch.known.clear();
         let rings = rings(body, grid, k);
         let (columns, padded) = self.plane.stored();
+        let blocks = padded / BLOCK;
         let rows = self.plane.len();
+        let together = (TOGETHER / (4 * nx)).clamp(1, rows);
+        // The last row has room for its padding, too.
+        (scratch.rows).resize((together - 1) * nx + padded.max(nx), 0.0);
+        scratch.doubts.resize(together * blocks, 0);
         let mut first = 0;
         while first < rows {
-            let next = (first + (TOGETHER / (4 * nx)).max(1)).min(rows);
-            let parts = (next - first) * padded;
-            scratch.parts.resize(parts, 0.0);
-            scratch.doubts.resize(parts / BLOCK, 0);
-            spread(
+            let next = (first + together).min(rows);
+            spread_rows(
                 kernel,
                 self.plane.radii(first..next),
                 &scratch.table,
                 self.near,
-                &mut scratch.parts,
-                &mut scratch.doubts,
+                (&mut scratch.rows, nx),
+                (&mut scratch.doubts, padded),
             );
-            for j in first..next {
-                let at = j - first;
-                let blocks = padded / BLOCK;
-                let marks = &scratch.doubts[at * blocks..(at + 1) * blocks];
-                let part = &mut scratch.parts[at * padded..at * padded + columns];
+            let marks = scratch.doubts.chunks(blocks);
+            let lines = scratch.rows.chunks_mut(nx);
+            for (j, (marks, row)) in (first..next).zip(marks.zip(lines)) {
                 let mend = Mend {
                     table: &scratch.table,
                     rings: &rings,
@@ -170,12 +179,15 @@ impl RadialSampler {
                     close: &mut scratch.close,
                     known: &mut scratch.known,
                 };
+                let part = &mut row[..columns];
                 self.mend(mend, marks, part);
                 if band.is_finite() {
                     clamp(part, stored(band));
                 }
+                self.plane.mirror(&mut row[..nx]);
             }
-            self.write(first..next, nx, writing, &scratch.parts, out);
+            let found = &scratch.rows[..(next - first) * nx];
+            self.write(first, nx, writing, found, &mut scratch.reversed, out);
             for [i, j] in scratch.close.drain(..) {
                 if writing.cancel.is_some_and(|cancel| cancel()) {
                     return;
@@ -198,38 +210,28 @@ impl RadialSampler {
         (self.plane.bytes() + self.field.bytes()) as u64
     }
 
-    /// Writes the rows whose parts are computed, and those that mirror them.
+    /// Writes rows from `first` on, and those that mirror them.
     fn write(
         &self,
-        rows: Range<usize>,
+        first: usize,
         nx: usize,
         writing: Writing<'_>,
-        values: &[f32],
+        rows: &[f32],
+        reversed: &mut Vec<f32>,
         out: &mut [f32],
     ) {
-        let (stored, padded) = self.plane.stored();
-        let parts = Parts {
-            values,
-            padded,
-            stored,
-            columns: nx,
+        let mut put = |from: &[f32], row: usize| {
+            writing.put(from, &mut out[row * nx..row * nx + from.len()]);
         };
-        let put = |part: Range<usize>, descending: bool, row: usize, out: &mut [f32]| {
-            let to = &mut out[row * nx..(row + part.len()) * nx];
-            let mut from = MirroredRows::new(parts, part, descending);
-            if writing.past_caches {
-                write_past_caches(writing.kernel, &mut from, to);
-            } else {
-                memory::write(&mut from, to);
-            }
-        };
-        put(0..rows.len(), false, rows.start, out);
+        put(rows, first);
         // A row without a twin among rows that have one is the last, in the middle.
-        let pairs = (rows.clone()).take_while(|j| self.plane.twin(*j).is_some());
-        if let Some(last) = pairs.last()
-            && let Some(twin) = self.plane.twin(last)
-        {
-            put(0..last + 1 - rows.start, true, twin, out);
+        let pairs = (first..first + rows.len() / nx).map_while(|j| self.plane.twin(j));
+        if let Some((pairs, last)) = pairs.enumerate().last() {
+            reversed.clear();
+            for row in rows[..(pairs + 1) * nx].chunks(nx).rev() {
+                reversed.extend_from_slice(row);
+            }
+            put(reversed, last);
         }
     }
 

@@ -28,6 +28,20 @@ pub(super) fn spread(
     out: &mut [f32],
     doubts: &mut [u8],
 ) {
+    let length = at.radii.len();
+    spread_rows(kernel, at, table, least, (out, length), (doubts, length));
+}
+
+/// The same for rows of `length` radii each: the values of each are written `stride` after those of the one before, in
+/// their order, so that what fills a row's last block may be overwritten by the next.
+pub(super) fn spread_rows(
+    kernel: Kernel,
+    at: Radii<'_>,
+    table: &RadialTable,
+    least: f32,
+    (out, stride): (&mut [f32], usize),
+    (doubts, length): (&mut [u8], usize),
+) {
     let (table, precise) = table.groups();
     let job = Spread {
         at,
@@ -37,12 +51,51 @@ pub(super) fn spread(
         out,
         doubts,
     };
+    let mut rows = Rows {
+        job,
+        length,
+        stride,
+    };
     match kernel.lanes() {
         #[cfg(target_arch = "x86_64")]
-        Some(Arch::V4(simd)) => simd.vectorize(Wide512(simd, job)),
+        Some(Arch::V4(simd)) => simd.vectorize(Wide512(simd, rows)),
         #[cfg(target_arch = "x86_64")]
-        Some(Arch::V3(simd)) => simd.vectorize(Wide256(simd, job)),
-        _ => job.run(0),
+        Some(Arch::V3(simd)) => simd.vectorize(Wide256(simd, rows)),
+        _ => (0..rows.count()).for_each(|n| rows.row(n).run(0)),
+    }
+}
+
+/// Rows of radii and of values.
+struct Rows<'a> {
+    job: Spread<'a>,
+    length: usize,
+    stride: usize,
+}
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.job.at.radii.len() / self.length.max(1)
+    }
+
+    /// One row.
+    #[inline(always)]
+    fn row(&mut self, n: usize) -> Spread<'_> {
+        let Self {
+            job,
+            length,
+            stride,
+        } = self;
+        let blocks = length.div_ceil(BLOCK);
+        Spread {
+            at: Radii {
+                radii: &job.at.radii[n * *length..(n + 1) * *length],
+                blocks: &job.at.blocks[n * blocks..(n + 1) * blocks],
+            },
+            out: &mut job.out[n * *stride..n * *stride + *length],
+            doubts: &mut job.doubts[n * blocks..(n + 1) * blocks],
+            ..*job
+        }
     }
 }
 
@@ -91,7 +144,7 @@ fn plain(table: &[Group], least: f32, radii: &[u32], out: &mut [f32]) -> u8 {
 // instructions switched on.
 
 #[cfg(target_arch = "x86_64")]
-struct Wide512<'a>(pulp::x86::V4, Spread<'a>);
+struct Wide512<'a>(pulp::x86::V4, Rows<'a>);
 
 /// Coefficient `c` of the cells that two groups hold.
 #[cfg(target_arch = "x86_64")]
@@ -112,11 +165,14 @@ impl pulp::NullaryFnOnce for Wide512<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self(simd, job) = self;
-        if job.precise {
-            run_512::<true>(simd, job);
-        } else {
-            run_512::<false>(simd, job);
+        let Self(simd, mut rows) = self;
+        let precise = rows.job.precise;
+        for n in 0..rows.count() {
+            if precise {
+                run_512::<true>(simd, rows.row(n));
+            } else {
+                run_512::<false>(simd, rows.row(n));
+            }
         }
     }
 }
@@ -201,7 +257,7 @@ fn pair(table: &[Group], first: usize) -> Option<&[Group; 2]> {
 }
 
 #[cfg(target_arch = "x86_64")]
-struct Wide256<'a>(pulp::x86::V3, Spread<'a>);
+struct Wide256<'a>(pulp::x86::V3, Rows<'a>);
 
 /// Coefficient `c` of the 16 cells from half a group on; `upper` has the sign where the cell is in their second half.
 #[cfg(target_arch = "x86_64")]
@@ -232,10 +288,20 @@ fn choose_256(
 impl pulp::NullaryFnOnce for Wide256<'_> {
     type Output = ();
 
-    /// A block at a time, whose cells are among 16 from half a group on.
     #[inline(always)]
     fn call(self) {
-        let Self(simd, job) = self;
+        let Self(simd, mut rows) = self;
+        for n in 0..rows.count() {
+            run_256(simd, rows.row(n));
+        }
+    }
+}
+
+/// A block at a time, whose cells are among 16 from half a group on.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
+    {
         let (f, i) = (simd.avx, simd.avx2);
         let Spread {
             at,

@@ -24,7 +24,6 @@ use super::bits::SideBits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
-use super::memory::copy_past_caches;
 use super::radial::Writing;
 use super::wedge::Wedge;
 use crate::grid::GridSpec;
@@ -232,15 +231,7 @@ impl TiltedSampler {
             }
             let from = &scratch.rows[..count * nx];
             let to = &mut out[first * nx..(first + count) * nx];
-            if writing.past_caches {
-                copy_past_caches(
-                    writing.kernel,
-                    bytemuck::cast_slice(from),
-                    bytemuck::cast_slice_mut(to),
-                );
-            } else {
-                to.copy_from_slice(from);
-            }
+            writing.put(from, to);
             self.settle(body, (grid, k), writing, &mut scratch.close, out);
         }
     }

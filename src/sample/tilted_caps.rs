@@ -16,7 +16,6 @@ use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapRow, GROUP, GUARD, LEAST_SINE, combined};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, Marks, Points, look_up, look_up_cap_ridge};
-use super::memory::copy_past_caches;
 use super::radial::{KnownLayer, Writing};
 use super::tilted::{ARCS, CELLS, MOST_ARCS, NEAR, TOGETHER, TiltedSampler, pays, step_for};
 use crate::grid::GridSpec;
@@ -175,12 +174,7 @@ impl TiltedCaps {
             }
             let from = &scratch.rows[..count * nx];
             let to = &mut out[first * nx..(first + count) * nx];
-            if writing.past_caches {
-                let (from, to) = (bytemuck::cast_slice(from), bytemuck::cast_slice_mut(to));
-                copy_past_caches(writing.kernel, from, to);
-            } else {
-                to.copy_from_slice(from);
-            }
+            writing.put(from, to);
         }
     }
 

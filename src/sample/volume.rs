@@ -1,6 +1,6 @@
 //! Whole volumes in memory, for callers who want them so.
 
-use super::layer::{LayerBuffers, LayerSampler, LayerScratch, Selection};
+use super::layer::{LayerBuffers, LayerSampler, Selection};
 use super::memory::advise_large_pages;
 use crate::grid::{BitVolume, GridSpec, Volume};
 use crate::scene::Scene;
@@ -51,9 +51,12 @@ impl LayerSampler<'_> {
     pub fn fill_occupancy(&self, out: &mut [u8]) {
         self.check_length(out.len());
         let layers = out.par_chunks_mut(self.grid().layer_len()).enumerate();
-        layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
-            self.occupancy_into(k, scratch, layer);
-        });
+        layers.for_each_init(
+            || self.filler(),
+            |with, (k, layer)| {
+                self.occupancy_into(k, with, layer);
+            },
+        );
     }
 
     /// Fills words with the occupancy of the whole grid, in parallel, a bit for each voxel as [`BitVolume`] has them.
@@ -68,9 +71,12 @@ impl LayerSampler<'_> {
             "whole layers of words"
         );
         let layers = out.par_chunks_mut(per_layer).enumerate();
-        layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
-            self.bits_into(k, scratch, layer);
-        });
+        layers.for_each_init(
+            || self.filler(),
+            |with, (k, layer)| {
+                self.bits_into(k, with, layer);
+            },
+        );
     }
 
     /// Fills a buffer of one value for each voxel with the signed distances of the whole grid, in parallel. The
@@ -86,9 +92,12 @@ impl LayerSampler<'_> {
             return;
         }
         let layers = out.par_chunks_mut(self.grid().layer_len()).enumerate();
-        layers.for_each_init(LayerScratch::default, |scratch, (k, layer)| {
-            self.distance_into(k, scratch, layer);
-        });
+        layers.for_each_init(
+            || self.filler(),
+            |with, (k, layer)| {
+                self.distance_into(k, with, layer);
+            },
+        );
     }
 
     fn check_length(&self, found: usize) {
