@@ -21,14 +21,26 @@ pub type Coefficients<T> = SmallVec<[T; 16]>;
 /// The value at `t`, by de Casteljau's algorithm.
 #[must_use]
 pub fn evaluate<T: Real>(coefficients: &[T], t: T) -> T {
-    let mut work: Coefficients<T> = SmallVec::from_slice(coefficients);
+    // Short ones in arrays, whose loops are unrolled.
+    match *coefficients {
+        [a, b] => reduced([a, b], t, 1)[0],
+        [a, b, c] => reduced([a, b, c], t, 1)[0],
+        [a, b, c, d] => reduced([a, b, c, d], t, 1)[0],
+        _ => reduced(Coefficients::from_slice(coefficients), t, 1)[0],
+    }
+}
+
+/// What is left of de Casteljau's triangle where `last` values are.
+#[inline(always)]
+fn reduced<T: Real, W: AsMut<[T]>>(mut triangle: W, t: T, last: usize) -> W {
+    let work = triangle.as_mut();
     let s = T::ONE - t;
-    for n in (1..work.len()).rev() {
+    for n in (last..work.len()).rev() {
         for i in 0..n {
             work[i] = s * work[i] + t * work[i + 1];
         }
     }
-    work[0]
+    triangle
 }
 
 /// The value and the derivative at `t`.
@@ -38,16 +50,19 @@ pub fn evaluate_with_derivative<T: Real>(coefficients: &[T], t: T) -> (T, T) {
     if degree == 0 {
         return (coefficients[0], T::ZERO);
     }
-    let mut work: Coefficients<T> = SmallVec::from_slice(coefficients);
-    let s = T::ONE - t;
-    for n in (2..work.len()).rev() {
-        for i in 0..n {
-            work[i] = s * work[i] + t * work[i + 1];
-        }
-    }
+    let [a, b] = match *coefficients {
+        [a, b] => [a, b],
+        [a, b, c] => first_two(&reduced([a, b, c], t, 2)),
+        [a, b, c, d] => first_two(&reduced([a, b, c, d], t, 2)),
+        _ => first_two(&reduced(Coefficients::from_slice(coefficients), t, 2)),
+    };
     #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
     let p = T::of(degree as f64);
-    (s * work[0] + t * work[1], p * (work[1] - work[0]))
+    ((T::ONE - t) * a + t * b, p * (b - a))
+}
+
+fn first_two<T: Real>(list: &[T]) -> [T; 2] {
+    [list[0], list[1]]
 }
 
 /// Splits at `t`: the polynomial on [0, t] and on [t, 1], each over its own [0, 1].

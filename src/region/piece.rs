@@ -183,6 +183,7 @@ impl Piece {
             -1.0
         };
         let beyond = |p: [f64; 2]| rising * (p[c] - q);
+        let beyond_at = |m: f64| rising * (t.coordinate(c, m) - q);
         #[allow(clippy::cast_precision_loss, reason = "a small count")]
         let parameter = |i: usize| i as f64 / TABLE as f64;
         let (mut low, mut high) = (0.0_f64, 1.0_f64);
@@ -195,29 +196,32 @@ impl Piece {
             (low, below) = (parameter(next - 1), beyond(t.table[next - 1]));
             (high, above) = (parameter(next), beyond(t.table[next]));
         }
-        // Secant and bisection in turn.
-        let mut slope = (above - below) / (high - low);
-        for step in 0..40 {
+        // Secants, whose older end counts less the better the last one did (Anderson and Björck 1973); now and then
+        // bisection.
+        let mut weights = [1.0_f64; 2];
+        for step in 1..40 {
             if high - low <= 4.0 * f64::EPSILON || below.abs().min(above.abs()) <= error {
                 break;
             }
-            let share = if step % 2 == 0 {
-                (below / (below - above)).clamp(1e-3, 1.0 - 1e-3)
-            } else {
-                0.5
+            let (a, b) = (weights[0] * below, weights[1] * above);
+            let mut m = low + (high - low) * (a / (a - b));
+            if step % 5 == 0 || !(m > low && m < high) {
+                m = 0.5 * (low + high);
+            }
+            let at = beyond_at(m);
+            let left = |last: f64| {
+                let left = 1.0 - at / last;
+                if left > 0.0 { left } else { 0.5 }
             };
-            let m = low + (high - low) * share;
-            let at = beyond(t.at(m));
             if at < 0.0 {
+                weights = [1.0, weights[1] * left(below)];
                 (low, below) = (m, at);
             } else {
+                weights = [weights[0] * left(above), 1.0];
                 (high, above) = (m, at);
             }
-            let chord = (above - below) / (high - low);
-            if chord > 0.0 {
-                slope = chord;
-            }
         }
+        let slope = (above - below) / (high - low);
         let middle = if below.abs() < above.abs() { low } else { high };
         let mut width = (4.0 * error / slope).max(4.0 * f64::EPSILON);
         for _ in 0..24 {
@@ -447,6 +451,13 @@ impl Twin {
     pub(crate) fn at(&self, t: f64) -> [f64; 2] {
         let w = bernstein::evaluate(&self.coefficients[2], t);
         [0, 1].map(|c| bernstein::evaluate(&self.coefficients[c], t) / w)
+    }
+
+    /// One of its coordinates.
+    #[inline]
+    fn coordinate(&self, c: usize, t: f64) -> f64 {
+        bernstein::evaluate(&self.coefficients[c], t)
+            / bernstein::evaluate(&self.coefficients[2], t)
     }
 }
 
