@@ -13,6 +13,9 @@
 use super::bits;
 use crate::math::{Kernel, SimdLevel};
 
+/// Values of a line of memory.
+pub(crate) const LINE: usize = 16;
+
 /// Stores that go past the caches, where the kernel's lanes have such. They may be seen late by other threads: not
 /// after the stream is dropped.
 #[derive(Debug)]
@@ -41,6 +44,19 @@ impl Stream {
             SimdLevel::Scalar | SimdLevel::Auto => {}
         }
         to.copy_from_slice(from);
+    }
+
+    /// The part of `to` that consists of whole lines; all of it where the kernel has no such stores. Less than a line is
+    /// before it, and after it.
+    pub(crate) fn whole_lines(&self, to: &[f32]) -> [usize; 2] {
+        match self.kernel.level() {
+            SimdLevel::Avx512 | SimdLevel::Avx2 => {
+                let head = to.as_ptr().align_offset(size_of::<[f32; LINE]>());
+                let head = head.min(to.len());
+                [head, head + (to.len() - head) / LINE * LINE]
+            }
+            SimdLevel::Scalar | SimdLevel::Auto => [0, to.len()],
+        }
     }
 
     /// Writes one byte, 0 or 1, for each bit.

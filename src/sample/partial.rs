@@ -48,6 +48,8 @@ const WIDEST: f64 = 2.0;
 const MOST_ARCS: usize = 20_000;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
+/// Bytes of rows written together past the caches: many lines, less than a cache.
+const TOGETHER: usize = 1 << 16;
 /// Distance of a cell's middle, in cells, from which on the boundary is not in the cell.
 const CLEAR: f64 = 0.75;
 
@@ -202,7 +204,7 @@ impl PartialSampler {
         row.resize(padded, 0.0);
         groups.resize(padded);
         places.resize(padded);
-        queue.start(nx);
+        queue.start(nx, TOGETHER, 0);
         let rows = self.plane.len();
         for n in 0..rows {
             if writing.cancel.is_some_and(|cancel| cancel()) {
@@ -215,18 +217,15 @@ impl PartialSampler {
                 let distances = &distances[..padded];
                 self.row(&layer, j, distances, (groups, places), row);
                 self.mend_row(&layer, j, distances, (groups, known_edges), row);
-                if writing.stream.is_none() {
-                    out[j * nx..(j + 1) * nx].copy_from_slice(&row[..nx]);
-                } else if is_twin {
+                if is_twin {
                     queue.push_behind(&row[..nx]);
                 } else {
                     queue.push_ahead(&row[..nx]);
                 }
             }
-            if let Some(stream) = writing.stream
-                && (queue.is_full() || n + 1 == rows)
-            {
-                queue.write(stream, out);
+            let last = n + 1 == rows;
+            if queue.is_full() || last {
+                queue.write(writing.stream, out, last);
             }
         }
     }

@@ -16,6 +16,7 @@ use super::known::Known;
 use super::layer::{Cancel, stored};
 use super::memory::Stream;
 use super::plane::{BLOCK, PLACES, Plane};
+use super::queue::RowQueue;
 use super::spread::spread_rows;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real, Side};
@@ -32,7 +33,7 @@ const WIDEST: f64 = 1.25;
 /// The most arcs a boundary is replaced by.
 const MOST_ARCS: usize = 20_000;
 /// Bytes written together past the caches: much more than a line, less than the nearest cache.
-const TOGETHER: usize = 1 << 13;
+const TOGETHER: usize = 1 << 14;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 
@@ -51,9 +52,7 @@ pub(super) struct RadialSampler {
 #[derive(Debug, Default)]
 pub(super) struct RadialScratch {
     table: RadialTable,
-    /// Some rows, and those in the opposite order.
-    rows: Vec<f32>,
-    reversed: Vec<f32>,
+    queue: RowQueue,
     doubts: Vec<u8>,
     /// Voxels of those rows whose sign the exact path tells.
     close: Vec<[usize; 2]>,
@@ -78,16 +77,6 @@ pub(super) struct Writing<'a> {
     pub(super) band: f64,
     /// What a layer is written with that is large and not read soon.
     pub(super) stream: Option<&'a Stream>,
-}
-
-impl Writing<'_> {
-    /// Writes values to their place in a layer.
-    pub(super) fn put(&self, from: &[f32], to: &mut [f32]) {
-        match self.stream {
-            Some(stream) => stream.copy(bytemuck::cast_slice(from), bytemuck::cast_slice_mut(to)),
-            None => to.copy_from_slice(from),
-        }
-    }
 }
 
 impl RadialSampler {
@@ -154,53 +143,58 @@ impl RadialSampler {
         let (columns, padded) = self.plane.stored();
         let blocks = padded / BLOCK;
         let rows = self.plane.len();
-        let together = (TOGETHER / (4 * nx)).clamp(1, rows);
-        // The last row has room for its padding, too.
-        (scratch.rows).resize((together - 1) * nx + padded.max(nx), 0.0);
-        scratch.doubts.resize(together * blocks, 0);
+        let RadialScratch {
+            table,
+            queue,
+            doubts,
+            close,
+            known,
+        } = scratch;
+        queue.start(nx, TOGETHER, padded);
+        let together = queue.room();
+        doubts.resize(together * blocks, 0);
         let mut first = 0;
         while first < rows {
             let next = (first + together).min(rows);
-            spread_rows(
-                kernel,
-                self.plane.radii(first..next),
-                &scratch.table,
-                self.near,
-                (&mut scratch.rows, nx),
-                (&mut scratch.doubts, padded),
-            );
-            let marks = scratch.doubts.chunks(blocks);
-            let lines = scratch.rows.chunks_mut(nx);
-            for (j, (marks, row)) in (first..next).zip(marks.zip(lines)) {
+            let radii = self.plane.radii(first..next);
+            let to = (queue.ahead(), nx);
+            spread_rows(kernel, radii, table, self.near, to, (doubts, padded));
+            for (j, marks) in (first..next).zip(doubts.chunks(blocks)) {
                 let mend = Mend {
-                    table: &scratch.table,
+                    table,
                     rings: &rings,
                     row: j,
-                    close: &mut scratch.close,
-                    known: &mut scratch.known,
+                    close,
+                    known,
                 };
+                let row = queue.waiting_row(j - first, false);
                 let part = &mut row[..columns];
                 self.mend(mend, marks, part);
                 if band.is_finite() {
                     clamp(part, stored(band));
                 }
-                self.plane.mirror(&mut row[..nx]);
+                self.plane.mirror(row);
+                queue.add_ahead();
+                if self.plane.twin(j).is_some() {
+                    queue.add_behind();
+                }
             }
-            let found = &scratch.rows[..(next - first) * nx];
-            self.write(first, nx, writing, found, &mut scratch.reversed, out);
-            for [i, j] in scratch.close.drain(..) {
+            for [i, j] in close.drain(..) {
                 if writing.cancel.is_some_and(|cancel| cancel()) {
                     return;
                 }
-                for j in std::iter::once(j).chain(self.plane.twin(j)) {
+                let twin = self.plane.twin(j).map(|j| (j, true));
+                for (row, downwards) in std::iter::once((j, false)).chain(twin) {
                     for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
-                        let point = grid.centre(i, j, k);
+                        let point = grid.centre(i, row, k);
                         let inside = body.contains(point);
                         let distance = body.distance(point, inside, band);
-                        out[j * nx + i] = stored(signed(distance, inside).clamp(-band, band));
+                        let value = stored(signed(distance, inside).clamp(-band, band));
+                        queue.waiting_row(j - first, downwards)[i] = value;
                     }
                 }
             }
+            queue.write(writing.stream, out, next == rows);
             first = next;
         }
     }
@@ -208,31 +202,6 @@ impl RadialSampler {
     /// Bytes that all threads share.
     pub(super) fn bytes(&self) -> u64 {
         (self.plane.bytes() + self.field.bytes()) as u64
-    }
-
-    /// Writes rows from `first` on, and those that mirror them.
-    fn write(
-        &self,
-        first: usize,
-        nx: usize,
-        writing: Writing<'_>,
-        rows: &[f32],
-        reversed: &mut Vec<f32>,
-        out: &mut [f32],
-    ) {
-        let mut put = |from: &[f32], row: usize| {
-            writing.put(from, &mut out[row * nx..row * nx + from.len()]);
-        };
-        put(rows, first);
-        // A row without a twin among rows that have one is the last, in the middle.
-        let pairs = (first..first + rows.len() / nx).map_while(|j| self.plane.twin(j));
-        if let Some((pairs, last)) = pairs.enumerate().last() {
-            reversed.clear();
-            for row in rows[..(pairs + 1) * nx].chunks(nx).rev() {
-                reversed.extend_from_slice(row);
-            }
-            put(reversed, last);
-        }
     }
 
     /// Fills in what the table left open of a row's stored part.

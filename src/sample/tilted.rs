@@ -24,6 +24,7 @@ use super::bits::SideBits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
+use super::queue::RowQueue;
 use super::radial::Writing;
 use super::wedge::Wedge;
 use crate::grid::GridSpec;
@@ -75,7 +76,7 @@ pub(super) struct TiltedScratch {
     blocks: BlockScratch,
     marks: Vec<Marks>,
     /// Rows that wait to be written together.
-    rows: Vec<f32>,
+    queue: RowQueue,
     close: Vec<Close>,
 }
 
@@ -201,38 +202,37 @@ impl TiltedSampler {
         let [nx, ny, _] = grid.dims();
         let view = self.view(k);
         let padded = nx.next_multiple_of(LANES);
-        let together = (TOGETHER / (4 * nx)).clamp(1, ny);
-        scratch.marks.resize(padded / LANES, Marks::default());
-        // The last row has room for its padding, too.
-        scratch.rows.resize((together - 1) * nx + padded, 0.0);
-        scratch.close.clear();
+        let TiltedScratch {
+            lanes,
+            marks,
+            queue,
+            close,
+            ..
+        } = scratch;
+        marks.resize(padded / LANES, Marks::default());
+        queue.start(nx, TOGETHER, LANES);
         let band = stored(writing.band);
-        for first in (0..ny).step_by(together) {
-            let count = together.min(ny - first);
-            for n in 0..count {
-                let row = &mut scratch.rows[n * nx..n * nx + padded];
-                let lanes = &mut scratch.lanes;
-                let marks = (self.near(), &mut *scratch.marks);
-                self.row(writing.kernel, (view, [0, first + n]), lanes, marks, row);
-                let row = &mut row[..nx];
-                let close = &mut scratch.close;
-                self.mend(
-                    writing.kernel,
-                    (view, first + n),
-                    &scratch.marks,
-                    row,
-                    close,
-                );
-                if writing.band.is_finite() {
-                    for value in row {
-                        *value = value.max(-band).min(band);
-                    }
+        for j in 0..ny {
+            let at = queue.waiting() * nx;
+            let row = &mut queue.ahead()[at..at + padded];
+            let found = (self.near(), &mut **marks);
+            self.row(writing.kernel, (view, [0, j]), lanes, found, row);
+            let row = &mut row[..nx];
+            self.mend(writing.kernel, (view, j), marks, row, close);
+            if writing.band.is_finite() {
+                for value in &mut *row {
+                    *value = value.max(-band).min(band);
                 }
             }
-            let from = &scratch.rows[..count * nx];
-            let to = &mut out[first * nx..(first + count) * nx];
-            writing.put(from, to);
-            self.settle(body, (grid, k), writing, &mut scratch.close, out);
+            self.settle(body, (grid, k), writing, close, row);
+            if writing.cancel.is_some_and(|cancel| cancel()) {
+                return;
+            }
+            queue.add_ahead();
+            let last = j + 1 == ny;
+            if queue.is_full() || last {
+                queue.write(writing.stream, out, last);
+            }
         }
     }
 
@@ -283,16 +283,15 @@ impl TiltedSampler {
         self.near as f32
     }
 
-    /// Asks the exact path for the voxels of layer `k` that are left to it.
+    /// Asks the exact path for the voxels of a row of layer `k` that are left to it.
     fn settle(
         &self,
         body: &Revolved,
         (grid, k): (&GridSpec, usize),
         writing: Writing<'_>,
         close: &mut Vec<Close>,
-        out: &mut [f32],
+        row: &mut [f32],
     ) {
-        let nx = grid.dims()[0];
         for Close { at: [i, j], size } in close.drain(..) {
             if writing.cancel.is_some_and(|cancel| cancel()) {
                 return;
@@ -300,7 +299,7 @@ impl TiltedSampler {
             let point = grid.centre(i, j, k);
             let side = body.contains(point);
             let distance = size.unwrap_or_else(|| body.distance(point, side, writing.band));
-            out[j * nx + i] = stored(signed(distance, side).clamp(-writing.band, writing.band));
+            row[i] = stored(signed(distance, side).clamp(-writing.band, writing.band));
         }
     }
 

@@ -16,6 +16,7 @@ use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapRow, GROUP, GUARD, LEAST_SINE, combined};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, Marks, Points, look_up, look_up_cap_ridge};
+use super::queue::RowQueue;
 use super::radial::{KnownLayer, Writing};
 use super::tilted::{ARCS, CELLS, MOST_ARCS, NEAR, TOGETHER, TiltedSampler, pays, step_for};
 use crate::grid::GridSpec;
@@ -57,8 +58,7 @@ pub(super) struct TiltedCapScratch {
     /// Distances of a row from the swept surface.
     distances: Vec<f32>,
     groups: CapScratch,
-    /// Rows that wait to be written together.
-    rows: Vec<f32>,
+    queue: RowQueue,
 }
 
 /// One layer as its rows see it.
@@ -158,23 +158,21 @@ impl TiltedCaps {
             writing,
         };
         let padded = self.x.len();
-        let together = (TOGETHER / (4 * nx)).clamp(1, ny);
         scratch.marks.resize(padded / LANES, Marks::default());
         scratch.distances.resize(padded, 0.0);
         scratch.groups.resize(padded);
-        // The last row has room for its padding, too.
-        scratch.rows.resize((together - 1) * nx + padded, 0.0);
-        for first in (0..ny).step_by(together) {
-            let count = together.min(ny - first);
-            for n in 0..count {
-                if writing.cancel.is_some_and(|cancel| cancel()) {
-                    return;
-                }
-                self.row(&layer, swept, first + n, scratch, n * nx);
+        scratch.queue.start(nx, TOGETHER, LANES);
+        for j in 0..ny {
+            if writing.cancel.is_some_and(|cancel| cancel()) {
+                return;
             }
-            let from = &scratch.rows[..count * nx];
-            let to = &mut out[first * nx..(first + count) * nx];
-            writing.put(from, to);
+            self.row(&layer, swept, j, scratch);
+            let queue = &mut scratch.queue;
+            queue.add_ahead();
+            let last = j + 1 == ny;
+            if queue.is_full() || last {
+                queue.write(writing.stream, out, last);
+            }
         }
     }
 
@@ -192,21 +190,20 @@ impl TiltedCaps {
         (row, [height, slope])
     }
 
-    /// Fills row `j` among the rows that wait, at `start`.
+    /// Fills row `j` behind the rows that wait.
     fn row(
         &self,
         layer: &Layer<'_>,
         swept: &TiltedSampler,
         j: usize,
         scratch: &mut TiltedCapScratch,
-        start: usize,
     ) {
         let TiltedCapScratch {
             lanes,
             marks,
             distances,
             groups,
-            rows,
+            queue,
         } = scratch;
         let k = layer.known.k;
         let nx = layer.grid.dims()[0];
@@ -237,7 +234,8 @@ impl TiltedCaps {
             least: self.near.min(band),
             band,
         };
-        let out = &mut rows[start..start + self.x.len()];
+        let start = queue.waiting() * nx;
+        let out = &mut queue.ahead()[start..start + self.x.len()];
         groups.fill(kernel, line, out, |range, edges| {
             let marks = &mut marks[..range.len() / LANES];
             let points = Points::Caps(row, &self.x[range], height);
