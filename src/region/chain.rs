@@ -405,6 +405,25 @@ impl Chain {
         }
     }
 
+    /// How far two points are beyond the normal at which one feature hands over to its neighbour, the second of two: the
+    /// first not at all, so it is not above 0. `None` where the two are no neighbours, or the points on no such sides.
+    pub(crate) fn past_joint(
+        &self,
+        [from, to]: [u32; 2],
+        points: [[f64; 2]; 2],
+    ) -> Option<[f64; 2]> {
+        let f = &self.features[from as usize];
+        let past = if f.after == to {
+            points.map(|q| dot(f.arc.to, minus(q, f.arc.end)))
+        } else if f.before == to {
+            points.map(|q| -dot(f.arc.from, minus(q, f.arc.start)))
+        } else {
+            return None;
+        };
+        let [before, beyond] = past;
+        (before <= 0.0 && beyond >= 0.0 && before < beyond).then_some(past)
+    }
+
     /// The features after one up to another, at most `most` joints away in either direction.
     #[inline]
     pub(crate) fn between(

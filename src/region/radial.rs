@@ -11,7 +11,8 @@
 //! jump K of the third at most `h³ K / 192` (the Peano kernel of cubic Hermite interpolation, a clamped beam, and
 //! its slope). Stretches that may err by more than the tolerance are halved. Single cells that may, and those where
 //! the distance is not smooth, have NaN as their first coefficient and are [`mended`](RadialTable::mended) voxel by
-//! voxel: where a ridge between smooth stretches of the boundary crosses the cell, from the cubics of those.
+//! voxel: where a ridge between smooth stretches of the boundary crosses the cell, from the cubics of those; where one
+//! feature hands over to the next, from that of either on its side of their common normal.
 //!
 //! Source of d⁗: `d = ρ - R` with ρ the distance from the centre, differentiated along a line: `d″ = b τ²`,
 //! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
@@ -35,13 +36,21 @@ pub(crate) struct RadialTable {
     /// Whether what the first coefficients lost is kept, as some distances are large.
     precise: bool,
     leaves: Vec<u32>,
-    /// For each cell that has some, its part of `cubics`: the first, and how many.
+    /// For each cell that has some, its part of `parts`: the first, and how many.
     ridges: Vec<[u32; 2]>,
-    /// Cubics of the stretches that may be nearest in cells with a ridge.
-    cubics: Vec<[f64; 4]>,
+    /// What may be nearest in cells without one cubic.
+    parts: Vec<Part>,
     kernel: Kernel,
     height: f64,
     scale: f64,
+}
+
+/// The cubic of a feature, from `from` to `to` over its cell.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    cubic: [f64; 4],
+    from: f64,
+    to: f64,
 }
 
 /// Groups read beyond the last cell's by lanes that do not use them.
@@ -92,7 +101,7 @@ impl RadialTable {
         (0..start).for_each(|k| self.settle(k, UNUSED));
         self.leaves.resize(columns, 0);
         self.ridges.resize(columns, [0; 2]);
-        self.cubics.clear();
+        self.parts.clear();
         self.kernel = kernel;
         self.height = z;
         self.scale = scale;
@@ -165,7 +174,12 @@ impl RadialTable {
         let count = to - from;
         let rivals = row.rivals([near, far], [from, to]);
         let ends = |i: usize| [&near.list[i].local, &far.list[i].local];
-        if let Some(Rivals { first, others: 0 }) = rivals {
+        if let Some(Rivals {
+            first,
+            others: 0,
+            good: true,
+        }) = rivals
+        {
             self.put(row.field, [from, to], ends(first));
         } else if count > 1 {
             let middle = from + count / 2;
@@ -176,16 +190,58 @@ impl RadialTable {
             self.leave_open(from);
             if let Some(rivals) = rivals {
                 // The distance is the least of theirs, and each is within the tolerance.
-                let start = u32::try_from(self.cubics.len()).unwrap_or(u32::MAX);
-                let length = row.field.cell() * self.scale;
-                for i in (0..near.count).filter(|i| rivals.has(*i)) {
-                    let cubic = self.cubic(ends(i), length);
-                    self.cubics.push(cubic);
+                let start = self.parts.len();
+                let mut runs = (0..near.count).filter(|i| rivals.has(*i));
+                if !runs.all(|i| self.add_parts(row, from, [&near.list[i], &far.list[i]])) {
+                    self.parts.truncate(start);
                 }
-                let count = u32::try_from(self.cubics.len()).unwrap_or(u32::MAX) - start;
-                self.ridges[from] = [start, count];
+                let [start, end] =
+                    [start, self.parts.len()].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+                self.ridges[from] = [start, end - start];
             }
         }
+    }
+
+    /// Adds what the distance to a run is made of in a cell: one cubic, or one on either side of a normal. Whether they
+    /// are within the tolerance; more may be added where they are not.
+    fn add_parts(&mut self, row: &Row<'_>, cell: usize, [near, far]: [&Foot; 2]) -> bool {
+        let (chain, h) = (row.field.chain(), row.field.cell());
+        let ends = [cell, cell + 1].map(|k| row.node(k));
+        let length = h * self.scale;
+        let passage = Passage::new(row.field, [near, far], ends[1], h);
+        if passage.is_some_and(|p| p.error(h) <= row.tolerance) {
+            self.parts.push(Part {
+                cubic: self.cubic([&near.local, &far.local], length),
+                from: f64::NEG_INFINITY,
+                to: f64::INFINITY,
+            });
+            return true;
+        }
+        let Some([before, beyond]) = chain.past_joint([near.feature, far.feature], ends) else {
+            return false;
+        };
+        // Where the row crosses the normal.
+        let joint = before / (before - beyond);
+        let sides = [
+            (
+                near.local,
+                chain.local(near.feature, ends[1]),
+                [f64::NEG_INFINITY, joint],
+            ),
+            (
+                chain.local(far.feature, ends[0]),
+                far.local,
+                [joint, f64::INFINITY],
+            ),
+        ];
+        sides.into_iter().all(|(a, b, [from, to])| {
+            self.parts.push(Part {
+                cubic: self.cubic([&a, &b], length),
+                from,
+                to,
+            });
+            smooth_error(h, a.bend.abs().max(b.bend.abs())) <= row.tolerance
+        })
     }
 
     /// The cubic over a stretch of `length`, in scene units, from what its ends know.
@@ -231,8 +287,11 @@ impl RadialTable {
         if count > 0 {
             #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
             let t = r / field.cell() - (field.columns().1 + cell as i64) as f64;
-            let cubics = self.cubics[start..start + count].iter();
-            let sizes = cubics.map(|[a, b, c, d]| (a + t * (b + t * (c + t * d))).abs());
+            let parts = self.parts[start..start + count].iter();
+            let sizes = parts.filter(|p| p.from <= t && t <= p.to).map(|p| {
+                let [a, b, c, d] = p.cubic;
+                (a + t * (b + t * (c + t * d))).abs()
+            });
             return sizes.fold(f64::INFINITY, f64::min);
         }
         let leaf = field.leaf(self.leaves[cell]);
@@ -259,6 +318,8 @@ struct Feet {
 struct Rivals {
     first: usize,
     others: u32,
+    /// Whether the cubic of each is within the tolerance.
+    good: bool,
 }
 
 impl Rivals {
@@ -325,7 +386,7 @@ impl Row<'_> {
     }
 
     /// The runs that may be nearest between two nodes; `None` where the cubic of one of them may err by more than the
-    /// tolerance.
+    /// tolerance over more than a cell.
     ///
     /// The differences to the others are linear but for the bends, where no other surface is crossed: they keep their
     /// sign where they have it at both ends by more than those. What the arcs err by is added: the sign of the distance
@@ -337,12 +398,15 @@ impl Row<'_> {
         let q = self.node(to);
         let passage = |i: usize| Passage::new(self.field, [&near.list[i], &far.list[i]], q, h);
         let good = |p: &Option<Passage>| p.as_ref().is_some_and(|p| p.error(h) <= self.tolerance);
-        let alone = Rivals {
+        let one_cell = to - from == 1;
+        let mut rivals = Rivals {
             first: 0,
             others: 0,
+            good: true,
         };
         if near.count == 1 {
-            return good(&passage(0)).then_some(alone);
+            rivals.good = good(&passage(0));
+            return (rivals.good || one_cell).then_some(rivals);
         }
         let size = |f: &Foot| f.local.value.abs();
         let first = (1..near.count).fold(0, |m, i| {
@@ -353,12 +417,13 @@ impl Row<'_> {
             }
         });
         let own = passage(first);
-        if !good(&own) {
+        rivals.first = first;
+        rivals.good = good(&own);
+        if !(rivals.good || one_cell) {
             return None;
         }
         let bend = |p: &Option<Passage>| p.as_ref().map_or(f64::INFINITY, |p| p.bend);
         let own = bend(&own);
-        let mut rivals = Rivals { first, ..alone };
         for (i, (a, b)) in near.all().iter().zip(far.all()).enumerate() {
             if i == first {
                 continue;
@@ -371,7 +436,8 @@ impl Row<'_> {
                 && gap(a, near).min(gap(b, far)) > 0.25 * h * bent + self.field.chain().margin();
             if !clear {
                 rivals.others |= 1 << i;
-                if !good(&passage) {
+                rivals.good &= good(&passage);
+                if !(rivals.good || one_cell) {
                     return None;
                 }
             }
