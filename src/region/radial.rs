@@ -11,8 +11,8 @@
 //! jump K of the third at most `h³ K / 192` (the Peano kernel of cubic Hermite interpolation, a clamped beam, and
 //! its slope). Stretches that may err by more than the tolerance are halved. Single cells that may, and those where
 //! the distance is not smooth, have NaN as their first coefficient and are [`mended`](RadialTable::mended) voxel by
-//! voxel: where a ridge between smooth stretches of the boundary crosses the cell, from the cubics of those; where one
-//! feature hands over to the next, from that of either on its side of their common normal.
+//! voxel: where a ridge between smooth stretches of the boundary crosses the cell, from the cubics of those; where
+//! features hand over, from that of each between its normals.
 //!
 //! Source of d⁗: `d = ρ - R` with ρ the distance from the centre, differentiated along a line: `d″ = b τ²`,
 //! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
@@ -202,8 +202,8 @@ impl RadialTable {
         }
     }
 
-    /// Adds what the distance to a run is made of in a cell: one cubic, or one on either side of a normal. Whether they
-    /// are within the tolerance; more may be added where they are not.
+    /// Adds what the distance to a run is made of in a cell: one cubic, or one between each two normals at which features
+    /// hand over. Whether they are within the tolerance; some may be added where they are not.
     fn add_parts(&mut self, row: &Row<'_>, cell: usize, [near, far]: [&Foot; 2]) -> bool {
         let (chain, h) = (row.field.chain(), row.field.cell());
         let ends = [cell, cell + 1].map(|k| row.node(k));
@@ -217,31 +217,29 @@ impl RadialTable {
             });
             return true;
         }
-        let Some([before, beyond]) = chain.past_joint([near.feature, far.feature], ends) else {
+        let Some(features) = chain.between(near.feature, far.feature, MOST_JOINTS) else {
             return false;
         };
-        // Where the row crosses the normal.
-        let joint = before / (before - beyond);
-        let sides = [
-            (
-                near.local,
-                chain.local(near.feature, ends[1]),
-                [f64::NEG_INFINITY, joint],
-            ),
-            (
-                chain.local(far.feature, ends[0]),
-                far.local,
-                [joint, f64::INFINITY],
-            ),
-        ];
-        sides.into_iter().all(|(a, b, [from, to])| {
-            self.parts.push(Part {
-                cubic: self.cubic([&a, &b], length),
-                from,
-                to,
-            });
+        let (mut feature, mut from) = (near.feature, f64::NEG_INFINITY);
+        let mut add = |feature: u32, from: f64, to: f64| {
+            let [a, b] = ends.map(|q| chain.local(feature, q));
+            let cubic = self.cubic([&a, &b], length);
+            self.parts.push(Part { cubic, from, to });
             smooth_error(h, a.bend.abs().max(b.bend.abs())) <= row.tolerance
-        })
+        };
+        for next in features {
+            // Where the row crosses the normal.
+            let Some([before, beyond]) = chain.past_joint([feature, next], ends) else {
+                return false;
+            };
+            let joint = before / (before - beyond);
+            if !(joint >= from && add(feature, from, joint)) {
+                return false;
+            }
+            (feature, from) = (next, joint);
+        }
+        // Without a joint, it is the bend of the only feature that is too much.
+        from.is_finite() && add(feature, from, f64::INFINITY)
     }
 
     /// The cubic over a stretch of `length`, in scene units, from what its ends know.

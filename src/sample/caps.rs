@@ -443,7 +443,8 @@ fn nearer(row: CapRow, swept: f32, [across, cap]: [f32; 2]) -> f32 {
     let swept = if turned { swept.abs() } else { f32::INFINITY };
     // The second comparison alone would do, were it not for caps that are NaN and do not matter.
     let cap = if cap >= swept { swept } else { cap };
-    if across.abs() >= swept { swept } else { cap }
+    // A swept distance that is not a number stays so.
+    if across.abs() < swept { cap } else { swept }
 }
 
 /// Unsigned distance of one voxel; NaN where it rests on an edge distance that is.
