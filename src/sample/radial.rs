@@ -258,8 +258,10 @@ fn rings(body: &Revolved, grid: &GridSpec, k: usize) -> Vec<Ring> {
 }
 
 /// Clamps values to ± `band`.
-fn clamp(values: &mut [f32], band: f32) {
+pub(super) fn clamp(values: &mut [f32], band: f32) {
     for value in values {
-        *value = value.max(-band).min(band);
+        // As lanes have it.
+        let least = if *value < -band { -band } else { *value };
+        *value = if least > band { band } else { least };
     }
 }

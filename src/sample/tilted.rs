@@ -25,7 +25,7 @@ use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
 use super::queue::RowQueue;
-use super::radial::Writing;
+use super::radial::{Writing, clamp};
 use super::wedge::Wedge;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Real};
@@ -220,9 +220,7 @@ impl TiltedSampler {
             let row = &mut row[..nx];
             self.mend(writing.kernel, (view, j), marks, row, close);
             if writing.band.is_finite() {
-                for value in &mut *row {
-                    *value = value.max(-band).min(band);
-                }
+                clamp(row, band);
             }
             self.settle(body, (grid, k), writing, close, row);
             if writing.cancel.is_some_and(|cancel| cancel()) {
