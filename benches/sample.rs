@@ -7,25 +7,30 @@
 //!   sdf/SCENE/KERNEL          the whole grid, f32
 //!   band/SCENE/KERNEL         distances clamped to three voxels
 //!   exact/SCENE               distances by the exact path alone, of a few rows: what a voxel costs without tables
-//!   formula                   sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid, its centre included
+//!   formula/SCENE             sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid, its centre included
 //!   fill/TYPE                 what writing takes: the same buffers, the same threads
 //!   fresh/SCENE               sdf into a new volume: the tables, the pages' first touch, the distances
+//!   fresh_touch               a new volume of one value: large pages, touched by all threads
 //!   fresh_vec                 what a new list of as many numbers takes, one thread touching its pages
 //! ```
 //!
-//! Grids of 256 voxels along the longest side. Every answer is compared with the plain loops bit for bit, and at some
+//! Grids of 512 voxels along the longest side; `off_centre` is the goblet with its axis beside the middle of the grid,
+//! so that no row mirrors another. The formula is that of the torus, on each scene's grid. Every answer is compared with the plain loops bit for bit, and at some
 //! voxels with the exact path, before it is timed.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rayon::prelude::*;
 use std::hint::black_box;
+use std::time::Duration;
 use voxlathe::Scene;
 use voxlathe::grid::GridSpec;
 use voxlathe::math::{Kernel, SimdLevel};
-use voxlathe::sample::{LayerBuffers, LayerSampler, Selection, signed_distance};
+use voxlathe::sample::{
+    LayerBuffers, LayerSampler, Selection, filled as constant, signed_distance,
+};
 
-const SIDE: u32 = 256;
-const SCENES: [&str; 3] = ["torus", "goblet", "flange"];
+const SIDE: u32 = 512;
+const SCENES: [&str; 6] = ["torus", "goblet", "off_centre", "cone", "vase", "flange"];
 
 fn kernels() -> Vec<(&'static str, Kernel)> {
     [
@@ -40,8 +45,16 @@ fn kernels() -> Vec<(&'static str, Kernel)> {
 
 fn load(name: &str) -> (Scene, GridSpec) {
     let sets = [format!("grid.resolution={SIDE}")];
-    let scene = Scene::load_with(format!("scenes/{name}.toml"), &sets).expect("a shipped scene");
+    let off_centre = name == "off_centre";
+    let file = if off_centre { "goblet" } else { name };
+    let scene = Scene::load_with(format!("scenes/{file}.toml"), &sets).expect("a shipped scene");
     let grid = scene.grid().expect("a grid");
+    if off_centre {
+        let spacing = grid.spacing();
+        let aside = grid.origin() + spacing * glam::DVec3::new(0.3, -0.2, 0.4);
+        let grid = GridSpec::new(grid.dims(), aside, spacing).expect("a grid as large");
+        return (scene, grid);
+    }
     (scene, grid)
 }
 
@@ -103,6 +116,8 @@ fn sampling(c: &mut Criterion) {
         let [nx, ny, nz] = grid.dims();
         let mut group = c.benchmark_group("sample");
         group.sample_size(10);
+        group.warm_up_time(Duration::from_millis(500));
+        group.measurement_time(Duration::from_secs(2));
         group.bench_function(BenchmarkId::new("prepare", name), |b| {
             b.iter(|| black_box(sampler(plain, None)));
         });
@@ -136,20 +151,25 @@ fn sampling(c: &mut Criterion) {
                 });
             });
         }
+        formula(&grid, &mut sdf);
         if name == "torus" {
-            formula(&grid, &mut sdf);
             for n in (0..sdf.len()).step_by(sdf.len() / 997) {
                 let (i, j, k) = (n % nx, n / nx % ny, n / (nx * ny));
                 let exact = scene.assembly().signed_distance(grid.centre(i, j, k));
                 assert!((f64::from(sdf[n]) - exact).abs() <= 1e-6, "the formula");
             }
-            group.bench_function("formula", |b| b.iter(|| formula(&grid, &mut sdf)));
         }
+        group.bench_function(BenchmarkId::new("formula", name), |b| {
+            b.iter(|| formula(&grid, &mut sdf));
+        });
         group.bench_function(BenchmarkId::new("fill/f32", name), |b| {
             b.iter(|| filled(&mut sdf, black_box(2.0)));
         });
         group.bench_function(BenchmarkId::new("fresh", name), |b| {
             b.iter(|| black_box(signed_distance(&scene, &grid)).is_ok());
+        });
+        group.bench_function(BenchmarkId::new("fresh_touch", name), |b| {
+            b.iter(|| black_box(constant(&grid, black_box(2.0))).is_ok());
         });
         group.bench_function(BenchmarkId::new("fresh_vec", name), |b| {
             b.iter(|| black_box(vec![black_box(1.0_f32); n]));

@@ -51,4 +51,4 @@ mod wedge;
 pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
 pub use tally::{Certainty, Tally};
-pub use volume::{fraction, material, occupancy, occupancy_bits, signed_distance};
+pub use volume::{filled, fraction, material, occupancy, occupancy_bits, signed_distance};

@@ -189,6 +189,26 @@ pub fn material(scene: &Scene, grid: &GridSpec) -> Result<Volume<u32>, crate::Er
     ))
 }
 
+/// A volume that has one value everywhere: what a volume in memory costs before anything is computed.
+///
+/// # Errors
+/// [`crate::Error`] when the volume does not fit the address space.
+///
+/// # Examples
+/// ```
+/// let grid = voxlathe::Scene::parse("schema = 1\n[[solid]]\nkind = 'sphere'\nradius = 1\n")?.grid()?;
+/// assert!(voxlathe::sample::filled(&grid, 2.0)?.data().iter().all(|v| *v == 2.0));
+/// # Ok::<(), voxlathe::Error>(())
+/// ```
+pub fn filled(grid: &GridSpec, value: f32) -> Result<Volume<f32>, crate::Error> {
+    fits(grid, 4)?;
+    let part = grid.layer_len();
+    Ok(fresh(grid, |data| {
+        data.par_chunks_mut(part)
+            .for_each(|layer| layer.fill(value));
+    }))
+}
+
 fn fits(grid: &GridSpec, bytes: u64) -> Result<(), crate::Error> {
     let needed = grid.voxel_count().saturating_mul(bytes);
     if isize::try_from(needed).is_ok() {
