@@ -121,12 +121,26 @@ pub(crate) fn expand(kernel: Kernel, words: &[u64], bytes: &mut [u8]) {
 #[inline(always)]
 fn expand_plain(words: &[u64], bytes: &mut [u8]) {
     for (&word, bytes) in words.iter().zip(bytes.chunks_mut(64)) {
-        for (n, bytes) in bytes.chunks_mut(8).enumerate() {
-            let byte = (word >> (8 * n)) & 0xff;
-            let eight: [u8; 8] = std::array::from_fn(|b| (byte >> b) as u8 & 1);
-            bytes.copy_from_slice(&eight[..bytes.len()]);
+        let (eights, rest) = bytes.as_chunks_mut::<8>();
+        let parts = word.to_le_bytes();
+        for (eight, &bits) in eights.iter_mut().zip(&parts) {
+            *eight = expanded(bits);
+        }
+        if let Some(&bits) = parts.get(eights.len()) {
+            rest.copy_from_slice(&expanded(bits)[..rest.len()]);
         }
     }
+}
+
+/// One byte for each of eight bits.
+#[inline(always)]
+fn expanded(bits: u8) -> [u8; 8] {
+    const EACH: u64 = 0x0101_0101_0101_0101;
+    /// Bit n of byte n.
+    const OWN: u64 = 0x8040_2010_0804_0201;
+    let own = (u64::from(bits) * EACH) & OWN;
+    // Any bit of a byte below the highest carries into that, and no further.
+    (((own + 0x7f * EACH) >> 7) & EACH).to_le_bytes()
 }
 
 #[cfg(target_arch = "x86_64")]
