@@ -7,7 +7,7 @@
 //!   sdf/SCENE/KERNEL          the whole grid, f32
 //!   band/SCENE/KERNEL         distances clamped to three voxels
 //!   exact/SCENE               distances by the exact path alone, of a few rows: what a voxel costs without tables
-//!   formula/SCENE             sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel of the torus's grid, its centre included
+//!   formula/SCENE             sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel, its row's centres at hand
 //!   fill/TYPE                 what writing takes: the same buffers, the same threads
 //!   fresh/SCENE               sdf into a new volume: the tables, the pages' first touch, the distances
 //!   fresh_touch               a new volume of one value: large pages, touched by all threads
@@ -74,12 +74,13 @@ fn filled(buffer: &mut [f32], value: f32) {
 /// The distance to the shipped torus, as anyone would write it.
 fn formula(grid: &GridSpec, out: &mut [f32]) {
     let [nx, ny, _] = grid.dims();
+    let across: Vec<f32> = (0..nx).map(|i| grid.centre(i, 0, 0).as_vec3().x).collect();
     let layers = out.par_chunks_mut(nx * ny).enumerate();
     layers.for_each(|(k, layer)| {
         for (j, row) in layer.chunks_mut(nx).enumerate() {
-            for (i, value) in row.iter_mut().enumerate() {
-                let p = grid.centre(i, j, k).as_vec3();
-                let ring = (p.x * p.x + p.y * p.y).sqrt() - 1.0;
+            let p = grid.centre(0, j, k).as_vec3();
+            for (value, x) in row.iter_mut().zip(&across) {
+                let ring = (x * x + p.y * p.y).sqrt() - 1.0;
                 *value = (ring * ring + p.z * p.z).sqrt() - 0.35;
             }
         }

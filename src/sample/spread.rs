@@ -301,74 +301,72 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
-    {
-        let (f, i) = (simd.avx, simd.avx2);
-        let Spread {
+    let (f, i) = (simd.avx, simd.avx2);
+    let Spread {
+        at,
+        table,
+        precise,
+        least,
+        out,
+        doubts,
+    } = job;
+    let (radii, rest) = at.radii.as_chunks::<BLOCK>();
+    let (values, _) = out.as_chunks_mut::<BLOCK>();
+    let part = f._mm256_set1_ps(1.0 / 65_536.0);
+    let low = f._mm256_set1_epi32(0xffff);
+    let limit = f._mm256_set1_ps(least);
+    let sign = f._mm256_set1_ps(-0.0);
+    for n in 0..radii.len() {
+        let (radii, values) = (&radii[n], &mut values[n]);
+        let first = at.blocks[n];
+        let (Some(g), true) = (pair(table, first as usize / 16), first != SCATTERED) else {
+            doubts[n] = plain(table, least, radii, values);
+            continue;
+        };
+        let half = first as usize / 8 % 2;
+        let radius = pulp::cast(*radii);
+        let cell = i._mm256_sub_epi32(
+            i._mm256_srli_epi32::<16>(radius),
+            f._mm256_set1_epi32((first / 8 * 8).cast_signed()),
+        );
+        // Cells from 8 on come from the second half: their bit 3, moved to the sign.
+        let upper = f._mm256_castsi256_ps(i._mm256_slli_epi32::<28>(cell));
+        let t = f._mm256_mul_ps(f._mm256_cvtepi32_ps(i._mm256_and_si256(radius, low)), part);
+        let value = f._mm256_mul_ps(t, choose_256(simd, g, [3, half], cell, upper));
+        let value = f._mm256_mul_ps(
+            t,
+            f._mm256_add_ps(choose_256(simd, g, [2, half], cell, upper), value),
+        );
+        let mut value = f._mm256_mul_ps(
+            t,
+            f._mm256_add_ps(choose_256(simd, g, [1, half], cell, upper), value),
+        );
+        if precise {
+            value = f._mm256_add_ps(choose_256(simd, g, [4, half], cell, upper), value);
+        }
+        let value = f._mm256_add_ps(choose_256(simd, g, [0, half], cell, upper), value);
+        *values = pulp::cast(value);
+        let size = f._mm256_andnot_ps(sign, value);
+        let mask = f._mm256_movemask_ps(f._mm256_cmp_ps::<9>(size, limit));
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "eight bits"
+        )]
+        {
+            doubts[n] = mask as u8;
+        }
+    }
+    let done = radii.len();
+    if !rest.is_empty() {
+        Spread {
             at,
             table,
             precise,
             least,
             out,
             doubts,
-        } = job;
-        let (radii, rest) = at.radii.as_chunks::<BLOCK>();
-        let (values, _) = out.as_chunks_mut::<BLOCK>();
-        let part = f._mm256_set1_ps(1.0 / 65_536.0);
-        let low = f._mm256_set1_epi32(0xffff);
-        let limit = f._mm256_set1_ps(least);
-        let sign = f._mm256_set1_ps(-0.0);
-        for n in 0..radii.len() {
-            let (radii, values) = (&radii[n], &mut values[n]);
-            let first = at.blocks[n];
-            let (Some(g), true) = (pair(table, first as usize / 16), first != SCATTERED) else {
-                doubts[n] = plain(table, least, radii, values);
-                continue;
-            };
-            let half = first as usize / 8 % 2;
-            let radius = pulp::cast(*radii);
-            let cell = i._mm256_sub_epi32(
-                i._mm256_srli_epi32::<16>(radius),
-                f._mm256_set1_epi32((first / 8 * 8).cast_signed()),
-            );
-            // Cells from 8 on come from the second half: their bit 3, moved to the sign.
-            let upper = f._mm256_castsi256_ps(i._mm256_slli_epi32::<28>(cell));
-            let t = f._mm256_mul_ps(f._mm256_cvtepi32_ps(i._mm256_and_si256(radius, low)), part);
-            let value = f._mm256_mul_ps(t, choose_256(simd, g, [3, half], cell, upper));
-            let value = f._mm256_mul_ps(
-                t,
-                f._mm256_add_ps(choose_256(simd, g, [2, half], cell, upper), value),
-            );
-            let mut value = f._mm256_mul_ps(
-                t,
-                f._mm256_add_ps(choose_256(simd, g, [1, half], cell, upper), value),
-            );
-            if precise {
-                value = f._mm256_add_ps(choose_256(simd, g, [4, half], cell, upper), value);
-            }
-            let value = f._mm256_add_ps(choose_256(simd, g, [0, half], cell, upper), value);
-            *values = pulp::cast(value);
-            let size = f._mm256_andnot_ps(sign, value);
-            let mask = f._mm256_movemask_ps(f._mm256_cmp_ps::<9>(size, limit));
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "eight bits"
-            )]
-            {
-                doubts[n] = mask as u8;
-            }
         }
-        let done = radii.len();
-        if !rest.is_empty() {
-            Spread {
-                at,
-                table,
-                precise,
-                least,
-                out,
-                doubts,
-            }
-            .run(done);
-        }
+        .run(done);
     }
 }
