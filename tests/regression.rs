@@ -1,7 +1,8 @@
 //! Faults found once, each by the name of what happened.
 
 use glam::DVec3;
-use voxlathe::Scene;
+use voxlathe::grid::GridSpec;
+use voxlathe::{Scene, sample};
 
 fn full_turn(curves: &str) -> Scene {
     Scene::parse(&format!(
@@ -95,4 +96,31 @@ fn a_wall_of_1e_13_is_a_wall() {
          kind = 'revolve'\nprofile = 'p'\n",
     );
     assert!(scene.is_ok(), "{}", scene.expect_err("refused"));
+}
+
+/// A sphere's arcs with one weight of 7e8 each in turn: the radii of a layer were bracketed so widely that voxels well
+/// outside had distances below 0.
+#[test]
+fn heavy_weights_leave_no_sign_to_wide_brackets() {
+    for heavy in [1.0, 1e3, 1e6, 1e9, 1e11] {
+        for which in 0..5 {
+            let mut weights = [1.0, 0.5_f64.sqrt(), 1.0, 0.5_f64.sqrt(), 1.0];
+            weights[which] *= heavy;
+            let scene = full_turn(&format!(
+                "{{ kind = 'nurbs', degree = 2, points = [[0, -10], [10, -10], [10, 0], [10, 10], [0, 10]], \
+                 weights = {weights:?}, knots = [0, 0, 0, 0.5, 0.5, 1, 1, 1] }}"
+            ));
+            let bounds = scene.bounds();
+            for n in [5.0, 13.0, 40.0] {
+                let spacing = (bounds.max - bounds.min) / n;
+                let grid = GridSpec::new([47, 46, 45], bounds.min - spacing * 0.3, spacing);
+                let grid = grid.expect("a grid");
+                let inside = sample::occupancy(&scene, &grid).expect("a small volume");
+                let sdf = sample::signed_distance(&scene, &grid).expect("a small volume");
+                let pairs = sdf.data().iter().zip(inside.data());
+                let wrong = pairs.filter(|(d, o)| (**d <= 0.0) != (**o == 1)).count();
+                assert_eq!(wrong, 0, "weight {which} times {heavy:e}, {n} voxels");
+            }
+        }
+    }
 }

@@ -196,16 +196,21 @@ impl Piece {
             (low, below) = (parameter(next - 1), beyond(t.table[next - 1]));
             (high, above) = (parameter(next), beyond(t.table[next]));
         }
-        // Secants, whose older end counts less the better the last one did (Anderson and Björck 1973); now and then
-        // bisection.
+        // Secants, whose older end counts less the better the last one did (Anderson and Björck 1973); bisection where
+        // three have not left half of the bracket, as where weights differ by much.
         let mut weights = [1.0_f64; 2];
-        for step in 1..40 {
+        let mut wide = high - low;
+        for step in 1..150 {
             if high - low <= 4.0 * f64::EPSILON || below.abs().min(above.abs()) <= error {
                 break;
             }
             let (a, b) = (weights[0] * below, weights[1] * above);
             let mut m = low + (high - low) * (a / (a - b));
-            if step % 5 == 0 || !(m > low && m < high) {
+            let slow = step % 3 == 0 && high - low > 0.5 * wide;
+            if step % 3 == 0 {
+                wide = high - low;
+            }
+            if slow || !(m > low && m < high) {
                 m = 0.5 * (low + high);
             }
             let at = beyond_at(m);

@@ -225,7 +225,12 @@ impl RadialSampler {
                     part[i] = at.known.value(radius, || {
                         let r = f64::from(radius) * self.field.cell() / PLACES;
                         let distance = (at.table).mended(&self.field, (radius >> 16) as usize, r);
-                        // Those for which the ring is in question are near the surface.
+                        let slack = self.field.cell() / PLACES;
+                        let around = |ring: &Ring| [ring.radius[0] - slack, ring.radius[1] + slack];
+                        if (at.rings.iter().map(around)).any(|[a, b]| a <= r && r <= b) {
+                            // The ring is in question: on the surface, or near one whose radius is not well known.
+                            return 0.0;
+                        }
                         let ring = at.rings.iter().find(|ring| r <= ring.radius[1]);
                         let inside = ring.is_some_and(|ring| ring.side != Side::Outside);
                         stored(signed(distance, inside))
