@@ -424,7 +424,7 @@ impl Chain {
         (before <= 0.0 && beyond >= 0.0 && before < beyond).then_some(past)
     }
 
-    /// The features after one up to another, at most `most` joints away in either direction.
+    /// The features after one up to another, at most `most` joints away in one direction and more in the other.
     #[inline]
     pub(crate) fn between(
         &self,
@@ -444,7 +444,11 @@ impl Chain {
             })
         };
         let ahead = count(true);
-        let steps = ahead.or_else(|| count(false))?;
+        let steps = match (ahead, count(false)) {
+            // Round a short ring either way may be meant.
+            (Some(_), Some(_)) => return None,
+            (ahead, back) => ahead.or(back)?,
+        };
         let mut at = from;
         Some((0..steps).map(move |_| {
             at = step(at, ahead.is_some());

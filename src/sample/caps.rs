@@ -357,7 +357,8 @@ impl pulp::NullaryFnOnce for SweptGroups<'_> {
                     // As whole numbers, whose largest the lanes may find in any order.
                     let bits = swept.iter().fold(0, |m, s| s.abs().to_bits().max(m));
                     let deepest = f32::from_bits(bits);
-                    gap < deepest
+                    // A distance that is not a number tells nothing.
+                    !(gap >= deepest)
                 };
             *wanted_here = wanted;
             if wanted {
