@@ -36,6 +36,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub(crate) struct CellTable {
     /// For each tile, r first, its level in the lowest bits and the number of its first cell in the others.
     tiles: Vec<u32>,
+    /// How far the circles of tiles that are not divided are off at most, in steps.
+    errors: Vec<f32>,
     /// Tiles along r.
     across: u32,
     cells: Vec<Cell>,
@@ -55,6 +57,18 @@ pub(crate) struct CellTable {
 /// bend times a step, with what the distance lost in its lowest [`LOST_BITS`]. Where the distance is NaN, the next two
 /// are the first of its circles among the ridges', and how many it has.
 pub(crate) type Cell = [u32; 4];
+
+/// The circle of a tile that is one cell, about its centre.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Circle {
+    /// In steps.
+    pub(crate) distance: f64,
+    pub(crate) gradient: [f64; 2],
+    /// One through the radius, in steps.
+    pub(crate) bend: f64,
+    /// How far the distance is from the circle's within the tile at most, in steps.
+    pub(crate) error: f64,
+}
 
 /// What a run has among the ridges: two circles, and the line between them.
 pub(crate) const PARTS: usize = 3;
@@ -84,7 +98,10 @@ const NAN: u32 = 0x7fc0_0000;
 impl CellTable {
     /// Bytes of what is kept.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.tiles) + size_of_val(&*self.cells) + size_of_val(&*self.ridges)
+        size_of_val(&*self.tiles)
+            + size_of_val(&*self.errors)
+            + size_of_val(&*self.cells)
+            + size_of_val(&*self.ridges)
     }
 
     /// The cells of a field whose unit is `scale` scene units, each within `tolerance` region units of the distance;
@@ -118,12 +135,15 @@ impl CellTable {
         }
         let mut cells = Vec::with_capacity(count);
         let mut tiles = Vec::with_capacity(across as usize * up as usize);
+        let mut errors = Vec::with_capacity(across as usize * up as usize);
         let mut ridges = Vec::new();
         cells.push(NONE);
         for row in rows {
             let first = u32::try_from(cells.len()).ok()?;
             let first_ridge = u32::try_from(ridges.len()).ok()?;
             ridges.extend_from_slice(&row.ridges);
+            #[allow(clippy::cast_possible_truncation, reason = "a bound, rounded upwards")]
+            errors.extend(row.errors.iter().map(|e| (*e as f32).next_up()));
             cells.extend(row.cells.iter().map(|cell| match *cell {
                 [NAN, first, count, rest] => [NAN, first_ridge + first, count, rest],
                 cell => cell,
@@ -140,6 +160,7 @@ impl CellTable {
         let lost = (LOST * step * scale / f64::from(1 << (32 - LOST_BITS))) as f32;
         Some(Self {
             tiles,
+            errors,
             across,
             cells,
             ridges,
@@ -153,6 +174,24 @@ impl CellTable {
     /// The tiles' numbers, and how many there are along r.
     pub(crate) fn tiles(&self) -> (&[u32], u32) {
         (&self.tiles, self.across)
+    }
+
+    /// The circle of a tile that is not divided; `None` where it is, or has none.
+    pub(crate) fn whole_tile(&self, tile: usize) -> Option<Circle> {
+        let error = f64::from(*self.errors.get(tile)?);
+        let tile = *self.tiles.get(tile)?;
+        let [distance, r, z, kept] = self.cells[(tile >> LEVEL_BITS) as usize];
+        if tile & ((1 << LEVEL_BITS) - 1) != 0 || distance == NAN {
+            return None;
+        }
+        let value = |bits: u32| f64::from(f32::from_bits(bits));
+        let lost = f64::from((kept << (32 - LOST_BITS)).cast_signed()) * f64::from(self.lost);
+        Some(Circle {
+            distance: (value(distance) + lost) / self.step[1],
+            gradient: [value(r), value(z)],
+            bend: 2.0 * value(kept & !((1 << LOST_BITS) - 1)),
+            error,
+        })
     }
 
     /// All cells.
@@ -178,6 +217,11 @@ impl CellTable {
         self.corner
     }
 
+    /// A step in the region's unit.
+    pub(crate) fn region_step(&self) -> f64 {
+        self.step[0]
+    }
+
     /// A step in scene units.
     pub(crate) fn step(&self) -> f64 {
         self.step[1]
@@ -201,6 +245,10 @@ struct Tiles<'a> {
     tolerance: f64,
     /// First cell and level of each tile that has cells.
     tiles: Vec<Option<[u32; 2]>>,
+    /// How far the circles of tiles that are not divided are off at most, in steps.
+    errors: Vec<f64>,
+    /// The same of the last circle, in the region's unit.
+    error: f64,
     cells: Vec<Cell>,
     ridges: Vec<Cell>,
     /// The features nearest to the last cell's centre, one of each run of its leaf.
@@ -213,6 +261,12 @@ type Feet = smallvec::SmallVec<[(u32, Local); MOST_RUNS]>;
 struct Near {
     leaf: Option<u32>,
     features: smallvec::SmallVec<[u32; MOST_RUNS]>,
+}
+
+/// A circle, or several, and how far it is off within its cell at most, in the region's unit.
+struct Bounded {
+    cell: Cell,
+    error: f64,
 }
 
 /// Why a cell has no circle.
@@ -230,6 +284,8 @@ impl<'a> Tiles<'a> {
             scale,
             tolerance,
             tiles: Vec::new(),
+            errors: Vec::new(),
+            error: f64::INFINITY,
             cells: Vec::new(),
             ridges: Vec::new(),
             near: Near::default(),
@@ -245,6 +301,7 @@ impl<'a> Tiles<'a> {
             if let Some(circles) = self.divided(tile, level) {
                 let at = u32::try_from(first).unwrap_or(u32::MAX);
                 self.tiles.push((circles > 0).then_some([at, level]));
+                self.errors.push(self.error / self.field.cell());
                 if circles == 0 {
                     self.cells.truncate(first);
                 }
@@ -280,8 +337,9 @@ impl<'a> Tiles<'a> {
                     side,
                 };
                 let cell = match self.circle(leaf, square, level == FINEST) {
-                    Ok(cell) => {
+                    Ok(Bounded { cell, error }) => {
                         circles += 1;
+                        self.error = error;
                         cell
                     }
                     Err(Refusal::Divide) if level < FINEST => return None,
@@ -294,7 +352,7 @@ impl<'a> Tiles<'a> {
     }
 
     /// The circle of one cell, or where it is one of the `finest` all that may be nearest in it.
-    fn circle(&mut self, number: u32, square: Square, finest: bool) -> Result<Cell, Refusal> {
+    fn circle(&mut self, number: u32, square: Square, finest: bool) -> Result<Bounded, Refusal> {
         let leaf: &Leaf = self.field.leaf(number);
         if !leaf.is_smooth() {
             return Err(Refusal::Never);
@@ -321,8 +379,8 @@ impl<'a> Tiles<'a> {
         }
         // Those that may be nearest somewhere in the cell, too.
         let rivals = || (feet[1..].iter()).filter(|f| !self.is_clear(feet[0], **f, square));
-        if let (Some(cell), None) = (cell, rivals().next()) {
-            return Ok(cell);
+        if let (Some(circle), None) = (cell, rivals().next()) {
+            return Ok(circle);
         }
         if !finest {
             return Err(Refusal::Divide);
@@ -339,19 +397,24 @@ impl<'a> Tiles<'a> {
             0,
         ];
         self.ridges.extend(parts.into_iter().flatten());
-        Ok(cell)
+        Ok(Bounded {
+            cell,
+            error: f64::INFINITY,
+        })
     }
 
     /// The circles of a run over a cell on both sides of the joint at which it bends most.
     fn split(&self, foot: (u32, Local), square: Square) -> Option<[Cell; PARTS]> {
-        if let Some(cell) = self.expanded(foot, square) {
+        if let Some(Bounded { cell, .. }) = self.expanded(foot, square) {
             return Some([cell, cell, [0; 4]]);
         }
         let chain = self.field.chain();
         let (joint, departure) = chain.split(foot.0, &square.corners())?;
         let centre = square.centre();
-        let near = self.within(foot.1, departure, square)?;
-        let far = self.within(chain.local(joint.next, centre), departure, square)?;
+        let near = self.within(foot.1, departure, square)?.cell;
+        let far = self
+            .within(chain.local(joint.next, centre), departure, square)?
+            .cell;
         let [r, z] = joint.along;
         let off = r * (centre[0] - joint.at[0]) + z * (centre[1] - joint.at[1]);
         #[allow(
@@ -391,13 +454,13 @@ impl<'a> Tiles<'a> {
     }
 
     /// The circle of a run over a cell, where it is within the tolerance.
-    fn expanded(&self, (feature, local): (u32, Local), square: Square) -> Option<Cell> {
+    fn expanded(&self, (feature, local): (u32, Local), square: Square) -> Option<Bounded> {
         let departure = self.field.chain().departure(feature, &square.corners());
         self.within(local, departure, square)
     }
 
-    /// A circle over a cell, where it is within the tolerance but for what is said.
-    fn within(&self, local: Local, departure: f64, square: Square) -> Option<Cell> {
+    /// A circle over a cell, where it is within the tolerance, and how far off it is at most.
+    fn within(&self, local: Local, departure: f64, square: Square) -> Option<Bounded> {
         let w = square.half_diagonal();
         if local.bend.abs() * w > BENT {
             return None;
@@ -407,8 +470,11 @@ impl<'a> Tiles<'a> {
         let v = half_bend.abs() * most;
         let rest = 42.0 * most * v.powi(5) / (1.0 - 4.0 * v);
         let rounding = BEND_ROUNDING * half_bend.abs() * w * w;
-        (departure + rest + rounding <= self.tolerance)
-            .then(|| self.stored(local.value, local.gradient, half_bend))
+        let error = departure + rest + rounding;
+        (error <= self.tolerance).then(|| Bounded {
+            cell: self.stored(local.value, local.gradient, half_bend),
+            error,
+        })
     }
 
     #[allow(
@@ -459,10 +525,10 @@ impl Square {
 }
 
 #[cfg(test)]
-mod tests {
+pub(in crate::region) mod tests {
     use super::*;
     use crate::region::radial::tests::{numbers, regions, swept};
-    use crate::region::{Chain, DistanceSet, Extent};
+    use crate::region::{BoundaryPiece, Chain, DistanceSet, Extent};
 
     impl CellTable {
         /// The table's distance at a point of the lattice, in f64 from the numbers kept.
@@ -512,28 +578,32 @@ mod tests {
         }
     }
 
+    /// A part of the half-plane around a boundary, so many steps wide.
+    pub(in crate::region) fn extent_of(swept: &[BoundaryPiece], voxels: f64) -> Extent {
+        let (mut right, mut low, mut top) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for b in swept.iter().map(|b| b.piece.bounds) {
+            right = right.max(b.max[0]);
+            low = low.min(b.min[1]);
+            top = top.max(b.max[1]);
+        }
+        let side = right.max(top - low);
+        Extent {
+            r: [0.0, 1.3 * side],
+            z: [low - 0.3 * side, top + 0.3 * side],
+            cell: 1.3 * side / voxels,
+        }
+    }
+
     #[test]
     fn cells_are_within_their_tolerance_of_the_distance() {
         for (name, region) in regions() {
             for voxels in [40.0, 300.0, 900.0] {
                 let swept = swept(&region);
                 let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
-                let bounds = swept.iter().map(|b| b.piece.bounds);
-                let (mut right, mut low, mut top) = (0.0_f64, 0.0_f64, 0.0_f64);
-                for b in bounds {
-                    right = right.max(b.max[0]);
-                    low = low.min(b.min[1]);
-                    top = top.max(b.max[1]);
-                }
-                let side = right.max(top - low);
-                let step = 1.3 * side / voxels;
+                let extent = extent_of(&swept, voxels);
+                let step = extent.cell;
                 let (arcs, cells) = (1.5e-5 * step, 4.5e-5 * step);
                 let chain = Chain::new(&swept, arcs, 100_000, true).expect("few arcs");
-                let extent = Extent {
-                    r: [0.0, 1.3 * side],
-                    z: [low - 0.3 * side, top + 0.3 * side],
-                    cell: step,
-                };
                 let features = chain.len();
                 let began = std::time::Instant::now();
                 let field = MeridianField::new(chain, extent).expect("a field");

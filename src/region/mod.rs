@@ -10,7 +10,7 @@
 //!                       └──> boundary ──┬──> distance    how far is it?
 //!                                       ├──> moments     how much is it?
 //!                                       └──> arcs ──> chain ──> field ──┬──> radial   how far, for many at once?
-//!                                                                  └──> cells
+//!                                                                  └──> cells ──> polynomials
 //! ```
 
 mod arcs;
@@ -26,6 +26,7 @@ mod field;
 mod field_nodes;
 mod moments;
 mod piece;
+mod polynomials;
 mod profile;
 mod radial;
 mod section;
@@ -46,6 +47,7 @@ pub(crate) use curve::{HomogeneousPoint, beziers};
 pub(crate) use field::{Extent, MeridianField};
 pub(crate) use moments::{Estimate, SectionMoments};
 pub(crate) use piece::Piece;
+pub(crate) use polynomials::{Polynomial, PolynomialTable, SQUARE};
 pub(crate) use radial::{GROUP, Group, RadialTable};
 pub(crate) use section::Section;
 pub(crate) use tree::{Box2, BoxTree};

@@ -14,7 +14,9 @@
 
 use super::caps::CapRow;
 use crate::math::{Kernel, root};
-use crate::region::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};
+use crate::region::{
+    CellTable, LEVEL_BITS, LOST_BITS, PARTS, Polynomial, PolynomialTable, SQUARE, TILE,
+};
 #[cfg(target_arch = "x86_64")]
 use pulp::Arch;
 
@@ -22,6 +24,8 @@ use pulp::Arch;
 pub(super) const CHUNK: usize = 256;
 /// Voxels of a block; chunks are filled up to whole ones.
 pub(super) const LANES: usize = 16;
+/// A block's middle, from its first voxel on.
+const MIDDLE: f64 = 0.5 * (LANES - 1) as f64;
 /// Added to a number below 2^31, leaves its nearest integer in the lowest bits of the sum.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
@@ -41,8 +45,8 @@ pub(super) struct LayerView {
 /// The points whose distances are wanted.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Points<'a> {
-    /// The voxels of a row j, from voxel i on.
-    Row(LayerView, f64, usize),
+    /// The voxels of a row j, from voxel i on, and the polynomials that may serve whole blocks of them.
+    Row(LayerView, f64, usize, &'a PolynomialTable),
     /// Points of the layer: i and j, whole or not.
     Any(LayerView, &'a [f64], &'a [f64]),
     /// Voxels i of a row as its nearer cap sees them; their heights, at 0 and the change along i.
@@ -79,6 +83,11 @@ pub(super) struct Marks {
     pub(super) doubtful: u16,
     /// Below 0.
     pub(super) negative: u16,
+}
+
+/// How far the middle of a block may be from its voxels, along r and z, in steps.
+pub(super) fn reach(table: &CellTable, across: f64, along: f64) -> [f64; 2] {
+    [across, along].map(|c| MIDDLE * c.abs() / f64::from(1_u32 << table.bits()))
 }
 
 /// Fills `out` with the signed distances of points of a layer, NaN where the table has none, and `marks` with what is
@@ -270,7 +279,190 @@ impl LookUp<'_> {
             out,
             marks,
         } = self;
-        let scale = Scale::new(table);
+        let cells = Cells {
+            table,
+            scale: Scale::new(table),
+            least,
+        };
+        let outs = out.chunks_mut(CHUNK).zip(marks.chunks_mut(CHUNK / LANES));
+        for (chunk, (out, marks)) in outs.enumerate() {
+            let first = chunk * CHUNK;
+            let Points::Row(view, j, from, polynomials) = points else {
+                cells.fill(block, points, first, lanes, (out, marks));
+                continue;
+            };
+            let squares = Squares {
+                polynomials,
+                bits: cells.scale.bits,
+                view: RowView::new(&view, j),
+            };
+            // Those before `done` have their distances.
+            let mut done = 0;
+            let blocks = out.len() / LANES;
+            let [mut r, mut z] = [[0; CHUNK / LANES]; 2];
+            let middles = [&mut r[..blocks], &mut z[..blocks]];
+            squares.middles(from + first, middles);
+            for n in 0..blocks {
+                let at = n * LANES;
+                let Some(polynomial) = squares.find([r[n], z[n]], from + first + at) else {
+                    continue;
+                };
+                if done < n {
+                    let part = (&mut out[done * LANES..at], &mut marks[done..n]);
+                    cells.fill(block, points, first + done * LANES, lanes, part);
+                }
+                done = n + 1;
+                let values = polynomial.values();
+                marks[n] = block.marks(&values, least);
+                out[at..at + LANES].copy_from_slice(&values);
+            }
+            if done < blocks {
+                let part = (&mut out[done * LANES..], &mut marks[done..]);
+                cells.fill(block, points, first + done * LANES, lanes, part);
+            }
+        }
+    }
+}
+
+/// The squares of polynomials that a row passes.
+struct Squares<'a> {
+    polynomials: &'a PolynomialTable,
+    bits: u32,
+    view: RowView,
+}
+
+impl<'a> Squares<'a> {
+    /// Places of the middles of blocks from voxel `first` on.
+    #[inline(always)]
+    #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+    fn middles(&self, first: usize, [r, z]: [&mut [u32]; 2]) {
+        self.view
+            .places([first as f64 + MIDDLE, LANES as f64], [r, z]);
+    }
+
+    /// What serves for the block from voxel `first` on, whose middle is at a place.
+    #[inline(always)]
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "voxel numbers are below 2^31; the coordinates are small and rounded once"
+    )]
+    fn find(&self, [r, z]: [u32; 2], first: usize) -> Option<Along<'a>> {
+        let shift = self.bits + SQUARE;
+        let [column, row] = [r, z].map(|c| c.wrapping_shr(shift));
+        let (polynomial, [squared, half]) = self.polynomials.find([column, row])?;
+        let per = 1.0 / f64::from(1_u32 << self.bits);
+        let RowView { x, y2, z, .. } = self.view;
+        let middle = first as f64 + MIDDLE;
+        let [at, step] = [(x[0] + middle * x[1]) * per, x[1] * per];
+        let height = (z[0] + middle * z[1]) * per;
+        let around = f64::from(row << SQUARE) + f64::from(1 << (SQUARE - 1));
+        Some(Along {
+            polynomial,
+            x: [
+                (at * at + y2 * (per * per) - squared) * half,
+                2.0 * half * at * step,
+                half * step * step,
+            ]
+            .map(|c| c as f32),
+            y: [height - around, z[1] * per].map(|c| c as f32),
+        })
+    }
+}
+
+/// A polynomial along a block, in its coordinates by the voxels' numbers from the middle on.
+struct Along<'a> {
+    polynomial: &'a Polynomial,
+    x: [f32; 3],
+    y: [f32; 2],
+}
+
+impl Along<'_> {
+    /// The distances of the block.
+    #[inline(always)]
+    fn values(&self) -> [f32; LANES] {
+        let Polynomial {
+            terms,
+            first,
+            is_low,
+        } = self.polynomial;
+        // In pairs, so that no sum waits long for another.
+        if *is_low {
+            return self.each(|x, y| {
+                let (x2, y2) = (x * x, y * y);
+                let low = row::<5>(terms, 0, y, y2) + x * row::<4>(terms, 7, y, y2);
+                let high = row::<3>(terms, 13, y, y2) + x * row::<2>(terms, 18, y, y2);
+                first + (low + x2 * (high + x2 * terms[22]))
+            });
+        }
+        self.each(|x, y| {
+            let (x2, y2) = (x * x, y * y);
+            let low = row::<7>(terms, 0, y, y2) + x * row::<6>(terms, 7, y, y2);
+            let middle = row::<5>(terms, 13, y, y2) + x * row::<4>(terms, 18, y, y2);
+            let high = row::<3>(terms, 22, y, y2) + x * row::<2>(terms, 25, y, y2);
+            first + (low + x2 * (middle + x2 * (high + x2 * terms[27])))
+        })
+    }
+
+    /// What a function is at the block's voxels.
+    #[inline(always)]
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "whole numbers and a half"
+    )]
+    fn each(&self, function: impl Fn(f32, f32) -> f32) -> [f32; LANES] {
+        let Self { x, y, .. } = *self;
+        let mut out = [0.0; LANES];
+        for (n, out) in out.iter_mut().enumerate() {
+            let t = n as f32 - MIDDLE as f32;
+            *out = function(x[0] + t * (x[1] + t * x[2]), y[0] + t * y[1]);
+        }
+        out
+    }
+}
+
+/// `N` terms of a polynomial from one on: their sum times the powers of `y`, whose square is `y2`.
+#[inline(always)]
+fn row<const N: usize>(terms: &[f32], from: usize, y: f32, y2: f32) -> f32 {
+    let pair = |n: usize| {
+        if n + 1 < N {
+            terms[from + n] + y * terms[from + n + 1]
+        } else {
+            terms[from + n]
+        }
+    };
+    let last = (N - 1) / 2;
+    let mut sum = pair(2 * last);
+    for n in (0..last).rev() {
+        sum = pair(2 * n) + y2 * sum;
+    }
+    sum
+}
+
+/// The cells of a table.
+struct Cells<'a> {
+    table: &'a CellTable,
+    scale: Scale,
+    least: f32,
+}
+
+impl Cells<'_> {
+    /// The distances of points from number `first` on, and what is known of them: at most a chunk.
+    #[inline(always)]
+    fn fill(
+        &self,
+        block: &impl Block,
+        points: Points<'_>,
+        first: usize,
+        lanes: &mut Lanes,
+        (out, marks): (&mut [f32], &mut [Marks]),
+    ) {
+        let Self {
+            table,
+            scale,
+            least,
+        } = self;
         let (tiles, _) = table.tiles();
         let cells = table.cells();
         let Lanes {
@@ -280,46 +472,40 @@ impl LookUp<'_> {
             cell,
             away: [ar, az],
         } = lanes;
-        let outs = out.chunks_mut(CHUNK).zip(marks.chunks_mut(CHUNK / LANES));
-        for (chunk, (out, marks)) in outs.enumerate() {
-            let count = out.len();
-            let (r, z) = (&mut r[..count], &mut z[..count]);
-            let (tile, cell) = (&mut tile[..count], &mut cell[..count]);
-            let (ar, az) = (&mut ar[..count], &mut az[..count]);
-            let first = chunk * CHUNK;
-            match points {
-                Points::Row(view, j, from) => {
-                    row_places(&view, j, from + first, [&mut *r, &mut *z]);
-                }
-                Points::Any(view, i, j) => {
-                    let range = first..first + count;
-                    any_places(&view, [&i[range.clone()], &j[range]], [&mut *r, &mut *z]);
-                }
-                Points::Caps(row, x, height) => {
-                    let x = &x[first..first + count];
-                    cap_places(row, x, height, [&mut *r, &mut *z]);
-                }
+        let count = out.len();
+        let (r, z) = (&mut r[..count], &mut z[..count]);
+        let (tile, cell) = (&mut tile[..count], &mut cell[..count]);
+        let (ar, az) = (&mut ar[..count], &mut az[..count]);
+        match points {
+            Points::Row(view, j, from, _) => {
+                #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
+                let start = (from + first) as f64;
+                RowView::new(&view, j).places([start, 1.0], [&mut *r, &mut *z]);
             }
-            tile_numbers(&scale, [r, z], tile);
-            for block in tile.as_chunks_mut::<LANES>().0 {
-                for tile in block {
-                    *tile = tiles[*tile as usize];
-                }
+            Points::Any(view, i, j) => {
+                let range = first..first + count;
+                any_places(&view, [&i[range.clone()], &j[range]], [&mut *r, &mut *z]);
             }
-            cell_numbers(&scale, [r, z], tile, cell, [&mut *ar, &mut *az]);
-            let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(marks);
-            let numbers = cell.as_chunks::<LANES>().0.iter();
-            let away = ar
-                .as_chunks::<LANES>()
-                .0
-                .iter()
-                .zip(az.as_chunks::<LANES>().0);
-            for (((out, marks), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
-                let four = block.collect(cells, numbers);
-                let values = distances(&four, [ar, az], &scale.factors);
-                *marks = block.marks(&values, least);
-                *out = values;
+            Points::Caps(row, x, height) => {
+                let x = &x[first..first + count];
+                cap_places(row, x, height, [&mut *r, &mut *z]);
             }
+        }
+        tile_numbers(scale, [r, z], tile);
+        for block in tile.as_chunks_mut::<LANES>().0 {
+            for tile in block {
+                *tile = tiles[*tile as usize];
+            }
+        }
+        cell_numbers(scale, [r, z], tile, cell, [&mut *ar, &mut *az]);
+        let blocks = out.as_chunks_mut::<LANES>().0.iter_mut().zip(marks);
+        let numbers = cell.as_chunks::<LANES>().0.iter();
+        let away = (ar.as_chunks::<LANES>().0.iter()).zip(az.as_chunks::<LANES>().0);
+        for (((out, marks), numbers), (ar, az)) in blocks.zip(numbers).zip(away) {
+            let four = block.collect(cells, numbers);
+            let values = distances(&four, [ar, az], &scale.factors);
+            *marks = block.marks(&values, *least);
+            *out = values;
         }
     }
 }
@@ -333,26 +519,47 @@ fn place(v: f64) -> u32 {
     (v + ROUND).to_bits() as u32
 }
 
-/// Places of voxels of row `j`.
-#[inline(always)]
-#[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-fn row_places(view: &LayerView, j: f64, first: usize, [r, z]: [&mut [u32]; 2]) {
-    let LayerView {
-        x,
-        y,
-        z: height,
-        base,
-    } = *view;
-    let start = first as f64;
-    let (x0, z0, y0) = (x[0] + j * x[2], height[0] + j * height[2], y[0] + j * y[1]);
-    let y2 = y0 * y0;
-    let count = r.len();
-    let z = &mut z[..count];
-    for n in 0..count {
-        let i = start + f64::from(n as u32);
-        let x = x0 + i * x[1];
-        r[n] = place(root(x * x + y2) - base);
-        z[n] = place(z0 + i * height[1]);
+/// A row as places see it: linear in i.
+#[derive(Clone, Copy)]
+struct RowView {
+    x: [f64; 2],
+    /// The square of what is across the row.
+    y2: f64,
+    z: [f64; 2],
+    base: f64,
+}
+
+impl RowView {
+    /// Row `j` of a layer.
+    #[inline(always)]
+    fn new(view: &LayerView, j: f64) -> Self {
+        let y = view.y[0] + j * view.y[1];
+        Self {
+            x: [view.x[0] + j * view.x[2], view.x[1]],
+            y2: y * y,
+            z: [view.z[0] + j * view.z[2], view.z[1]],
+            base: view.base,
+        }
+    }
+
+    /// Places of the numbers from `start` on, `step` apart.
+    #[inline(always)]
+    fn places(&self, [start, step]: [f64; 2], [r, z]: [&mut [u32]; 2]) {
+        let Self {
+            x,
+            y2,
+            z: height,
+            base,
+        } = *self;
+        let count = r.len();
+        let z = &mut z[..count];
+        for n in 0..count {
+            #[allow(clippy::cast_possible_truncation, reason = "at most a chunk")]
+            let i = start + f64::from(n as u32) * step;
+            let x = x[0] + i * x[1];
+            r[n] = place(root(x * x + y2) - base);
+            z[n] = place(height[0] + i * height[1]);
+        }
     }
 }
 

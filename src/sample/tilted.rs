@@ -3,39 +3,46 @@
 //! [`super::tilted_caps`] joins with those to the caps.
 //!
 //! A voxel's distance depends on its radius and height in the body's frame. One table of small cells over those
-//! ([`CellTable`]) serves the whole grid; rows and points of a layer look their distances up ([`super::lookup`]). What
+//! ([`CellTable`]) serves the whole grid; rows and points of a layer look their distances up ([`super::lookup`]). On
+//! larger grids most blocks of a row have one polynomial for all of their voxels ([`PolynomialTable`]). What
 //! the table does not hold to the stored precision is mended voxel by voxel: from the circles on both sides where the
 //! distance has a ridge, from the features of the field's leaf where it is bent too much, by the exact path where the surface is so near that the sign is in
 //! question.
 //!
 //! ```text
 //!   |stored - exact| <= arcs 1.5e-5 + cells 4.5e-5 + places 1.1e-5 + sums 0.5e-5 of the least spacing + 1/2 ulp
+//!                    <= arcs 1.5e-5 + polynomials 5e-5 + sums 1e-5 of the least spacing + 1/2 ulp
 //! ```
 //!
-//! * arcs and cells are proved in [`crate::region`];
+//! * arcs, cells and polynomials are proved in [`crate::region`];
 //! * a place has 18 bits after the point at least, 2^-19 of a step of up to four least spacings off at most in r and in
 //!   z; with the 20 that grids of less than
 //!   1024 voxels have it is 1e-6;
 //! * the sums: a cell's numbers are f32 and its points at most 2.9 steps from the centre, so each of the ten roundings
 //!   is of a number below 3 steps, 2e-7 of them; what the distance lost at the centre is kept to 5e-8. That stays below
-//!   what is said as long as a step is the least spacing; where it is more, by the tolerance of the cells.
+//!   what is said as long as a step is the least spacing; where it is more, by the tolerance of the cells;
+//! * the sums of a polynomial, which is only made where a step is the least spacing: x and y are of at most 15 steps and
+//!   rounded four times, so are the largest products; every other sum is of less than one step a term.
 
 use super::bits::SideBits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
-use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge};
+use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge, reach};
 use super::queue::RowQueue;
 use super::radial::{Writing, clamp};
 use super::wedge::Wedge;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Real};
-use crate::region::{CellTable, Chain, Extent, MeridianField};
+use crate::region::{CellTable, Chain, Extent, MeridianField, PolynomialTable};
 use crate::solid::{Revolved, Turn, signed};
 use glam::DVec3;
 
 /// Shares of the least spacing.
 pub(super) const ARCS: f64 = 1.5e-5;
 pub(super) const CELLS: f64 = 4.5e-5;
+const POLYNOMIALS: f64 = 5e-5;
+/// Fewer voxels for each square of the table do not make up for the making of its polynomial.
+const PER_SQUARE: u64 = 5000;
 /// Nearer to the surface than this the exact path answers.
 pub(super) const NEAR: f64 = 2e-4;
 /// The most arcs a boundary is replaced by.
@@ -59,6 +66,7 @@ const COARSEST: f64 = 4.0;
 pub(super) struct TiltedSampler {
     field: MeridianField,
     table: CellTable,
+    polynomials: PolynomialTable,
     /// Places of voxel (0, 0, 0), and their changes along i, j and k.
     x: [f64; 4],
     y: [f64; 4],
@@ -133,6 +141,17 @@ impl TiltedSampler {
             ]
         };
         let [o, i, j, k] = [start, along[0], along[1], along[2]].map(seen);
+        let squares = PolynomialTable::squares(&table) as u64;
+        let worth = grid.voxel_count() >= squares.saturating_mul(PER_SQUARE);
+        let polynomials = if worth && table.step() < 1.5 * least {
+            PolynomialTable::new(
+                &table,
+                reach(&table, i[0], i[2]),
+                POLYNOMIALS * least / table.step(),
+            )
+        } else {
+            PolynomialTable::default()
+        };
         Some(Self {
             x: [o[0], i[0], j[0], k[0]],
             y: [o[1], 0.0, j[1], k[1]],
@@ -141,12 +160,13 @@ impl TiltedSampler {
             near: NEAR * least,
             field,
             table,
+            polynomials,
         })
     }
 
     /// Bytes that all threads share.
     pub(super) fn bytes(&self) -> u64 {
-        (self.field.bytes() + self.table.bytes()) as u64
+        (self.field.bytes() + self.table.bytes() + self.polynomials.bytes()) as u64
     }
 
     /// A layer as places see it.
@@ -245,7 +265,7 @@ impl TiltedSampler {
         out: &mut [f32],
     ) {
         #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
-        let points = Points::Row(view, j as f64, i);
+        let points = Points::Row(view, j as f64, i, &self.polynomials);
         look_up(kernel, &self.table, points, least, lanes, (out, marks));
     }
 
