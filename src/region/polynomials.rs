@@ -372,8 +372,8 @@ fn powers(n: usize, alpha: f64, beta: f64) -> [f64; 3] {
     };
     let kept = power(alpha * HALF, n) + next * power(HALF, n + 1);
     let rest = match n {
-        0 | 1 => 0.0,
-        2 => 0.0,
+        // All of these is kept: of the square what counts q⁴ stands apart.
+        0..=2 => 0.0,
         _ => power(alpha * HALF + beta * HALF * HALF, n) - kept,
     };
     [power(alpha, n), next, rest.max(0.0)]
