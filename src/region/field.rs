@@ -163,6 +163,30 @@ impl MeridianField {
         self.visit(self.root, 0, self.lattice.levels, row, each);
     }
 
+    /// Calls `each(from, to, leaf)` for the leaves that a smallest cell is divided into at height `z`, between two radii
+    /// of it; for the cell's own where it is not.
+    pub(crate) fn parts_at(
+        &self,
+        z: f64,
+        leaf: u32,
+        [from, to]: [f64; 2],
+        each: &mut impl FnMut(f64, f64, u32),
+    ) {
+        let whole = self.leaf(leaf);
+        if whole.kind != Kind::Divided {
+            each(from, to, leaf);
+            return;
+        }
+        let row = 2 * usize::from(z >= whole.centre[1]);
+        let middle = whole.centre[0].clamp(from, to);
+        for (quarter, ends) in [(row, [from, middle]), (row + 1, [middle, to])] {
+            // Parts of cells are leaves.
+            if let Node::Leaf(part) = self.nodes.quarters[whole.start as usize][quarter] {
+                self.parts_at(z, part, ends, each);
+            }
+        }
+    }
+
     fn visit(
         &self,
         node: Node,

@@ -12,12 +12,13 @@
 //! its slope). Stretches that may err by more than the tolerance are halved. Single cells that may, and those where
 //! the distance is not smooth, have NaN as their first coefficient and are [`mended`](RadialTable::mended) voxel by
 //! voxel: where a ridge between smooth stretches of the boundary crosses the cell, from the cubics of those; where
-//! features hand over, from that of each between its normals.
+//! features hand over, from that of each between its normals; where they bend too much for a cubic, from the features
+//! themselves. In cells that no surface can be in, the sign is known.
 //!
 //! Source of d⁗: `d = ρ - R` with ρ the distance from the centre, differentiated along a line: `d″ = b τ²`,
 //! `d‴ = -3 b² g τ²` with b = 1 / ρ, g the slope and τ² = 1 - g², and `b′ = -b² g`, `|b″| <= 2 |b|³`.
 
-use super::chain::Local;
+use super::chain::{Chain, Local};
 use super::field::MeridianField;
 use super::field_nodes::MOST_RUNS;
 use crate::math::Kernel;
@@ -36,21 +37,43 @@ pub(crate) struct RadialTable {
     /// Whether what the first coefficients lost is kept, as some distances are large.
     precise: bool,
     leaves: Vec<u32>,
-    /// For each cell that has some, its part of `parts`: the first, and how many.
-    ridges: Vec<[u32; 2]>,
-    /// What may be nearest in cells without one cubic.
+    /// What is known of the cells without one cubic, and which those are.
+    open: Vec<OpenCell>,
+    opened: Vec<u32>,
+    /// What may be nearest in them.
     parts: Vec<Part>,
     kernel: Kernel,
     height: f64,
     scale: f64,
 }
 
-/// The cubic of a feature, from `from` to `to` over its cell.
+/// A cell without one cubic.
+#[derive(Debug, Clone, Copy, Default)]
+struct OpenCell {
+    /// Its part of `parts`: the first, and how many.
+    first: u32,
+    count: u32,
+    /// That of the distance in all of it; 0 where it is not known.
+    sign: f64,
+    /// Whether a list of features must be searched in it.
+    searched: bool,
+}
+
+/// What answers from `from` to `to` over its cell.
 #[derive(Debug, Clone, Copy)]
 struct Part {
-    cubic: [f64; 4],
+    form: Form,
     from: f64,
     to: f64,
+}
+
+/// How the distance to a feature is found.
+#[derive(Debug, Clone, Copy)]
+enum Form {
+    Cubic([f64; 4]),
+    Feature(u32),
+    /// All of the cell's leaf.
+    Leaf,
 }
 
 /// Groups read beyond the last cell's by lanes that do not use them.
@@ -100,7 +123,8 @@ impl RadialTable {
         self.groups[columns / GROUP..].fill([[0.0; GROUP]; 5]);
         (0..start).for_each(|k| self.settle(k, UNUSED));
         self.leaves.resize(columns, 0);
-        self.ridges.resize(columns, [0; 2]);
+        self.open.resize(columns, OpenCell::default());
+        self.opened.clear();
         self.parts.clear();
         self.kernel = kernel;
         self.height = z;
@@ -119,10 +143,10 @@ impl RadialTable {
             self.leaves[from..to].fill(number);
             let features = field.features(field.leaf(number));
             if features.is_empty() {
-                (from..to).for_each(|k| self.leave_open(k));
+                (from..to).for_each(|k| self.open_by_leaves(&row, k));
                 return;
             }
-            let mut near = row.first_feet(features, from);
+            let mut near = Feet::new(field, features, row.node(from));
             for start in (from..to).step_by(WIDEST) {
                 let end = to.min(start + WIDEST);
                 let far = row.feet(&near, end);
@@ -163,9 +187,66 @@ impl RadialTable {
         }
     }
 
-    fn leave_open(&mut self, cell: usize) {
+    /// Leaves a cell to the parts from `start` on, or where there are none to its leaf.
+    fn leave_open(&mut self, cell: usize, start: usize) {
+        if self.parts.len() == start {
+            self.parts.push(Part {
+                form: Form::Leaf,
+                from: 0.0,
+                to: 1.0,
+            });
+        }
+        let [first, end] = [start, self.parts.len()].map(number);
         self.groups[cell / GROUP][0][cell % GROUP] = f32::NAN;
-        self.ridges[cell] = [0; 2];
+        self.opened.push(number(cell));
+        let parts = self.parts[start..].iter();
+        self.open[cell] = OpenCell {
+            first,
+            count: end - first,
+            sign: 0.0,
+            searched: { parts }.any(|p| matches!(p.form, Form::Leaf)),
+        };
+    }
+
+    /// Leaves a cell to the leaves that it is divided into.
+    fn open_by_leaves(&mut self, row: &Row<'_>, cell: usize) {
+        let start = self.parts.len();
+        let ends = [cell, cell + 1].map(|k| row.node(k)[0]);
+        let place = |r: f64| (r - ends[0]) / row.field.cell();
+        let leaf = self.leaves[cell];
+        row.field
+            .parts_at(row.z, leaf, ends, &mut |from, to, leaf| {
+                // The last ends with the cell, however that was rounded.
+                let end = if to == ends[1] { 1.0 } else { place(to) };
+                let stretch = Stretch {
+                    ends: [from, to].map(|r| [r, row.z]),
+                    places: [place(from), end],
+                };
+                self.add_leaf(row, leaf, stretch);
+            });
+        self.leave_open(cell, start);
+    }
+
+    /// Adds what may be nearest in a leaf: the features of its runs, else the leaf.
+    fn add_leaf(&mut self, row: &Row<'_>, number: u32, stretch: Stretch) {
+        let (start, chain) = (self.parts.len(), row.field.chain());
+        let features = row.field.features(row.field.leaf(number));
+        let feet = stretch.ends.map(|q| Feet::new(row.field, features, q));
+        let least = feet.each_ref().map(Feet::least);
+        // No distance changes by more than the way.
+        let [from, to] = stretch.ends;
+        let reach = 2.0 * (to[0] - from[0] + chain.margin());
+        let found = (0..features.len()).all(|i| {
+            let [near, far] = feet.each_ref().map(|f| &f.list[i]);
+            let behind = near.size() - least[0] + (far.size() - least[1]);
+            behind > reach || self.add_run(chain, [near, far], stretch, Form::Feature)
+        });
+        if !found || self.parts.len() == start {
+            self.parts.truncate(start);
+            let [from, to] = stretch.places;
+            let form = Form::Leaf;
+            self.parts.push(Part { form, from, to });
+        }
     }
 
     /// Tabulates cells of one leaf from what its runs know at both ends: by one cubic where that is within the
@@ -187,68 +268,79 @@ impl RadialTable {
             self.span(row, [from, middle], near, &feet);
             self.span(row, [middle, to], &feet, far);
         } else {
-            self.leave_open(from);
+            let start = self.parts.len();
             if let Some(rivals) = rivals {
                 // The distance is the least of theirs, and each is within the tolerance.
-                let start = self.parts.len();
                 let mut runs = (0..near.count).filter(|i| rivals.has(*i));
                 if !runs.all(|i| self.add_parts(row, from, [&near.list[i], &far.list[i]])) {
                     self.parts.truncate(start);
                 }
-                let [start, end] =
-                    [start, self.parts.len()].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
-                self.ridges[from] = [start, end - start];
             }
+            self.leave_open(from, start);
         }
     }
 
-    /// Adds what the distance to a run is made of in a cell: one cubic, or one between each two normals at which features
-    /// hand over. Whether they are within the tolerance; some may be added where they are not.
-    fn add_parts(&mut self, row: &Row<'_>, cell: usize, [near, far]: [&Foot; 2]) -> bool {
+    /// Adds what the distance to a run is made of in a cell: one cubic, or one part between each two normals at which
+    /// features hand over. Whether all were found; some may be added where they were not.
+    fn add_parts(&mut self, row: &Row<'_>, cell: usize, feet: [&Foot; 2]) -> bool {
         let (chain, h) = (row.field.chain(), row.field.cell());
         let ends = [cell, cell + 1].map(|k| row.node(k));
-        let length = h * self.scale;
-        let passage = Passage::new(row.field, [near, far], ends[1], h);
+        let (length, scale) = (h * self.scale, self.scale);
+        let places = [0.0, 1.0];
+        let passage = Passage::new(row.field, feet, ends[1], h);
         if passage.is_some_and(|p| p.error(h) <= row.tolerance) {
-            self.parts.push(Part {
-                cubic: self.cubic([&near.local, &far.local], length),
-                from: f64::NEG_INFINITY,
-                to: f64::INFINITY,
-            });
+            let [near, far] = feet.map(|f| &f.local);
+            let form = Form::Cubic(cubic([near, far], scale, length));
+            let [from, to] = places;
+            self.parts.push(Part { form, from, to });
             return true;
         }
+        self.add_run(chain, feet, Stretch { ends, places }, |feature| {
+            let [a, b] = ends.map(|q| chain.local(feature, q));
+            if smooth_error(h, a.bend.abs().max(b.bend.abs())) <= row.tolerance {
+                Form::Cubic(cubic([&a, &b], scale, length))
+            } else {
+                Form::Feature(feature)
+            }
+        })
+    }
+
+    /// Adds the features of a run, each up to the normal at which it hands over to the next. Whether all were found.
+    fn add_run(
+        &mut self,
+        chain: &Chain,
+        [near, far]: [&Foot; 2],
+        stretch: Stretch,
+        form: impl Fn(u32) -> Form,
+    ) -> bool {
         let Some(features) = chain.between(near.feature, far.feature, MOST_JOINTS) else {
             return false;
         };
-        let (mut feature, mut from) = (near.feature, f64::NEG_INFINITY);
-        let mut add = |feature: u32, from: f64, to: f64| {
-            let [a, b] = ends.map(|q| chain.local(feature, q));
-            let cubic = self.cubic([&a, &b], length);
-            self.parts.push(Part { cubic, from, to });
-            smooth_error(h, a.bend.abs().max(b.bend.abs())) <= row.tolerance
-        };
-        for next in features {
-            // Where the row crosses the normal.
-            let Some([before, beyond]) = chain.past_joint([feature, next], ends) else {
+        let [mut from, end] = stretch.places;
+        let mut feature = near.feature;
+        for next in features.filter(|_| near.feature != far.feature) {
+            let Some([before, beyond]) = chain.past_joint([feature, next], stretch.ends) else {
                 return false;
             };
-            let joint = before / (before - beyond);
-            if !(joint >= from && add(feature, from, joint)) {
+            let joint = stretch.place(before / (before - beyond));
+            if !(from <= joint && joint <= end) {
                 return false;
             }
+            let form = form(feature);
+            self.parts.push(Part {
+                form,
+                from,
+                to: joint,
+            });
             (feature, from) = (next, joint);
         }
-        // Without a joint, it is the bend of the only feature that is too much.
-        from.is_finite() && add(feature, from, f64::INFINITY)
-    }
-
-    /// The cubic over a stretch of `length`, in scene units, from what its ends know.
-    #[inline]
-    fn cubic(&self, [near, far]: [&Local; 2], length: f64) -> [f64; 4] {
-        let (a, b) = (near.value * self.scale, far.value * self.scale);
-        let (da, db) = (near.gradient[0] * length, far.gradient[0] * length);
-        let rise = b - a;
-        [a, da, 3.0 * rise - 2.0 * da - db, da + db - 2.0 * rise]
+        let form = form(feature);
+        self.parts.push(Part {
+            form,
+            from,
+            to: end,
+        });
+        true
     }
 
     /// Gives cells their parts of one cubic.
@@ -259,7 +351,7 @@ impl RadialTable {
     )]
     fn put(&mut self, field: &MeridianField, [from, to]: [usize; 2], ends: [&Local; 2]) {
         let count = (to - from) as f64;
-        let [a, b, c, d] = self.cubic(ends, count * field.cell() * self.scale);
+        let [a, b, c, d] = cubic(ends, self.scale, count * field.cell() * self.scale);
         let part = 1.0 / count;
         for k in from..to {
             let t = (k - from) as f64 * part;
@@ -271,7 +363,6 @@ impl RadialTable {
                 part * part * part * d,
                 value - f64::from(value as f32),
             ];
-            self.ridges[k] = [0; 2];
             let group = &mut self.groups[k / GROUP];
             for (row, v) in group.iter_mut().zip(coefficients) {
                 row[k % GROUP] = v as f32;
@@ -279,22 +370,95 @@ impl RadialTable {
         }
     }
 
-    /// The unsigned distance in scene units at `r` region units in a cell without a cubic.
-    pub(crate) fn mended(&self, field: &MeridianField, cell: usize, r: f64) -> f64 {
-        let [start, count] = self.ridges[cell].map(|n| n as usize);
-        if count > 0 {
-            #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
-            let t = r / field.cell() - (field.columns().1 + cell as i64) as f64;
-            let parts = self.parts[start..start + count].iter();
-            let sizes = parts.filter(|p| p.from <= t && t <= p.to).map(|p| {
-                let [a, b, c, d] = p.cubic;
-                (a + t * (b + t * (c + t * d))).abs()
-            });
-            return sizes.fold(f64::INFINITY, f64::min);
+    /// Finds the signs in cells that the surface is not in; `inside` tells them by the radius.
+    pub(crate) fn find_signs(&mut self, field: &MeridianField, inside: impl Fn(f64) -> bool) {
+        let reach = (field.cell() + field.chain().margin()) * self.scale;
+        for n in 0..self.opened.len() {
+            let cell = self.opened[n] as usize;
+            // No distance changes by more than the way.
+            if self.size(field, cell, 0.0) > reach {
+                let r = self.radius(field, cell, 0.5);
+                self.open[cell].sign = if inside(r) { -1.0 } else { 1.0 };
+            }
         }
-        let leaf = field.leaf(self.leaves[cell]);
-        field.distance(self.kernel, leaf, [r, self.height]) * self.scale
     }
+
+    /// The signed distance in scene units at a place in a cell without a cubic, from 0 to 1 in it, where it is to be had
+    /// at little cost.
+    #[inline]
+    pub(crate) fn signed(&self, field: &MeridianField, cell: usize, place: f64) -> Option<f64> {
+        let open = &self.open[cell];
+        let quick = open.sign != 0.0 && !open.searched;
+        quick.then(|| open.sign * self.size(field, cell, place))
+    }
+
+    /// The sign of the distance in all of a cell without a cubic, where it is known.
+    pub(crate) fn sign(&self, cell: usize) -> Option<f64> {
+        Some(self.open[cell].sign).filter(|s| *s != 0.0)
+    }
+
+    /// The unsigned distance in scene units at a place in a cell without a cubic.
+    #[inline]
+    pub(crate) fn size(&self, field: &MeridianField, cell: usize, place: f64) -> f64 {
+        let OpenCell { first, count, .. } = self.open[cell];
+        let mut least = f64::INFINITY;
+        for part in &self.parts[first as usize..][..count as usize] {
+            let value = match part.form {
+                Form::Cubic([a, b, c, d]) => a + place * (b + place * (c + place * d)),
+                _ => self.searched(field, cell, part, place),
+            };
+            // Without a branch that nobody can foresee.
+            let counts = (part.from <= place) & (place <= part.to);
+            least = least.min(if counts { value.abs() } else { f64::INFINITY });
+        }
+        least
+    }
+
+    /// The distance of a part that is no cubic.
+    fn searched(&self, field: &MeridianField, cell: usize, part: &Part, place: f64) -> f64 {
+        if !(part.from <= place && place <= part.to) {
+            return f64::INFINITY;
+        }
+        let q = [self.radius(field, cell, place), self.height];
+        let distance = match part.form {
+            Form::Feature(feature) => field.chain().local(feature, q).value,
+            _ => field.distance(self.kernel, field.leaf(self.leaves[cell]), q),
+        };
+        distance * self.scale
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
+    fn radius(&self, field: &MeridianField, cell: usize, place: f64) -> f64 {
+        ((field.columns().1 + cell as i64) as f64 + place) * field.cell()
+    }
+}
+
+/// The cubic over a stretch of `length` scene units, of which a unit has `scale`, from what its ends know.
+#[inline]
+fn cubic([near, far]: [&Local; 2], scale: f64, length: f64) -> [f64; 4] {
+    let (a, b) = (near.value * scale, far.value * scale);
+    let (da, db) = (near.gradient[0] * length, far.gradient[0] * length);
+    let rise = b - a;
+    [a, da, 3.0 * rise - 2.0 * da - db, da + db - 2.0 * rise]
+}
+
+/// A part of a row in one cell: its ends, and their places in the cell.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    ends: [[f64; 2]; 2],
+    places: [f64; 2],
+}
+
+impl Stretch {
+    /// The place at a part of the way.
+    fn place(&self, part: f64) -> f64 {
+        let [from, to] = self.places;
+        from + part * (to - from)
+    }
+}
+
+fn number(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 /// The nearest feature of a run, with its distance.
@@ -327,6 +491,11 @@ impl Rivals {
 }
 
 impl Foot {
+    /// The distance without its sign.
+    fn size(&self) -> f64 {
+        self.local.value.abs()
+    }
+
     #[inline]
     fn new(field: &MeridianField, from: u32, q: [f64; 2]) -> Self {
         let feature = field.chain().walk(from, q);
@@ -338,6 +507,25 @@ impl Foot {
 }
 
 impl Feet {
+    /// Those of a point, from a feature of each run.
+    fn new(field: &MeridianField, features: &[u32], q: [f64; 2]) -> Self {
+        let mut feet = Self {
+            count: features.len(),
+            ..Self::default()
+        };
+        for (foot, &from) in feet.list.iter_mut().zip(features) {
+            *foot = Foot::new(field, from, q);
+        }
+        feet
+    }
+
+    /// The least distance without its sign.
+    fn least(&self) -> f64 {
+        self.all()
+            .iter()
+            .fold(f64::INFINITY, |m, f| m.min(f.size()))
+    }
+
     fn all(&self) -> &[Foot] {
         &self.list[..self.count]
     }
@@ -357,19 +545,6 @@ impl Row<'_> {
     fn node(&self, k: usize) -> [f64; 2] {
         let r = (self.first + k as i64) as f64 * self.field.cell();
         [r, self.z]
-    }
-
-    /// The feet of node `k`, from a feature of each run.
-    fn first_feet(&self, features: &[u32], k: usize) -> Feet {
-        let q = self.node(k);
-        let mut feet = Feet {
-            count: features.len(),
-            ..Feet::default()
-        };
-        for (foot, &from) in feet.list.iter_mut().zip(features) {
-            *foot = Foot::new(self.field, from, q);
-        }
-        feet
     }
 
     /// The feet of node `k`, from those of another point of the leaf.
@@ -406,9 +581,8 @@ impl Row<'_> {
             rivals.good = good(&passage(0));
             return (rivals.good || one_cell).then_some(rivals);
         }
-        let size = |f: &Foot| f.local.value.abs();
         let first = (1..near.count).fold(0, |m, i| {
-            if size(&near.list[i]) < size(&near.list[m]) {
+            if near.list[i].size() < near.list[m].size() {
                 i
             } else {
                 m
@@ -426,7 +600,7 @@ impl Row<'_> {
             if i == first {
                 continue;
             }
-            let gap = |f: &Foot, feet: &Feet| size(f) - size(&feet.list[first]);
+            let gap = |f: &Foot, feet: &Feet| f.size() - feet.list[first].size();
             let passage = passage(i);
             let bent = h * (bend(&passage) + own);
             let clear = a.local.value * b.local.value > 0.0
@@ -682,13 +856,16 @@ pub(super) mod tests {
                 let built = began.elapsed();
                 let mut table = RadialTable::default();
                 let mut number = numbers(7);
-                let (mut worst, mut special, mut all) = (0.0_f64, 0_u32, 0_u32);
+                let (mut worst, mut special, mut all, mut signs) = (0.0_f64, 0_u32, 0_u32, 0_u32);
                 let (columns, _) = field.columns();
                 let mut time = std::time::Duration::ZERO;
                 for _ in 0..60 {
                     let z = extent.z[0] + (extent.z[1] - extent.z[0]) * number();
                     let began = std::time::Instant::now();
                     table.fill(Kernel::default(), &field, z, 1.0, 3.5e-5 * cell);
+                    table.find_signs(&field, |r| {
+                        region.section().side_of(r, z) != crate::math::Side::Outside
+                    });
                     time += began.elapsed();
                     for k in 0..columns {
                         let t = number();
@@ -701,7 +878,15 @@ pub(super) mod tests {
                         all += 1;
                         let found = if a.is_nan() {
                             special += 1;
-                            table.mended(&field, k, r)
+                            let inside =
+                                region.section().side_of(r, z) != crate::math::Side::Outside;
+                            let sign = table.sign(k);
+                            assert!(
+                                sign.is_none_or(|s| inside == (s < 0.0)),
+                                "{name} {voxels}: sign at {r} {z}: {sign:?}"
+                            );
+                            signs += u32::from(sign.is_some());
+                            table.size(&field, k, t)
                         } else {
                             let v: f64 = a + (lost + t * (b + t * (c + t * d)));
                             let inside =
@@ -723,9 +908,10 @@ pub(super) mod tests {
                 }
                 let (leaves, smooth) = field.census();
                 eprintln!(
-                    "{name:>9} {voxels:>5}: {features} features, {leaves} leaves, {smooth} smooth, {built:?}; tables {:?} each, {:.2}% mended, worst {worst:.1e} of a cell",
+                    "{name:>9} {voxels:>5}: {features} features, {leaves} leaves, {smooth} smooth, {built:?}; tables {:?} each, {:.2}% mended, {:.0}% of them with a sign, worst {worst:.1e} of a cell",
                     time / 60,
-                    100.0 * f64::from(special) / f64::from(all)
+                    100.0 * f64::from(special) / f64::from(all),
+                    100.0 * f64::from(signs) / f64::from(special)
                 );
             }
         }

@@ -28,9 +28,9 @@ use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapPlane, Places, combined, dispatch};
 use super::known::Known;
 use super::layer::stored;
-use super::plane::{BLOCK, PLACES, Plane, Radii};
-use super::queue::RowQueue;
+use super::plane::{BLOCK, PLACES, Plane, Radii, cell_and_place};
 use super::radial::{KnownLayer, Writing};
+use super::row_writer::RowWriter;
 use super::spread::spread;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Real};
@@ -48,8 +48,6 @@ const WIDEST: f64 = 2.0;
 const MOST_ARCS: usize = 20_000;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
-/// Bytes of rows written together past the caches: many lines, less than a cache.
-const TOGETHER: usize = 1 << 16;
 /// Distance of a cell's middle, in cells, from which on the boundary is not in the cell.
 const CLEAR: f64 = 0.75;
 
@@ -76,10 +74,9 @@ pub(super) struct PartialScratch {
     /// Distances of a row from the swept surface.
     distances: Vec<f32>,
     marks: Vec<u8>,
-    row: Vec<f32>,
     groups: CapScratch,
     places: PlaceScratch,
-    queue: RowQueue,
+    writer: RowWriter,
     /// Values of either table that were mended.
     known_swept: Known,
     known_edges: Known,
@@ -180,10 +177,9 @@ impl PartialSampler {
             crossed,
             distances,
             marks,
-            row,
             groups,
             places,
-            queue,
+            writer,
             known_swept,
             known_edges,
         } = scratch;
@@ -201,10 +197,9 @@ impl PartialSampler {
         };
         let padded = self.caps.x().len();
         distances.resize(padded.max(self.plane.stored().1), 0.0);
-        row.resize(padded, 0.0);
         groups.resize(padded);
         places.resize(padded);
-        queue.start(nx, TOGETHER, 0);
+        writer.start(nx, padded - nx);
         let rows = self.plane.len();
         for n in 0..rows {
             if writing.cancel.is_some_and(|cancel| cancel()) {
@@ -215,17 +210,15 @@ impl PartialSampler {
             let twin = self.plane.twin(n);
             for (j, is_twin) in std::iter::once((n, false)).chain(twin.map(|t| (t, true))) {
                 let distances = &distances[..padded];
+                let row = &mut writer.row()[..padded];
                 self.row(&layer, j, distances, (groups, places), row);
                 self.mend_row(&layer, j, distances, (groups, known_edges), row);
+                let last = n + 1 == rows;
                 if is_twin {
-                    queue.push_behind(&row[..nx]);
+                    writer.write_behind(writing.stream, out, last);
                 } else {
-                    queue.push_ahead(&row[..nx]);
+                    writer.write_ahead(writing.stream, out, last);
                 }
-            }
-            let last = n + 1 == rows;
-            if queue.is_full() || last {
-                queue.write(writing.stream, out, last);
             }
         }
     }
@@ -285,7 +278,7 @@ impl PartialSampler {
             }
             #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
             let middle = ((first + k as i64) as f64 + 0.5) * cell;
-            if table.mended(&self.edges, k, middle) < clear {
+            if table.size(&self.edges, k, 0.5) < clear {
                 *crossed = true;
             } else if body.section_holds([middle, height]) {
                 table.settle(k, -1.0);
@@ -314,7 +307,6 @@ impl PartialSampler {
             &mut distances[..padded],
             marks,
         );
-        let per_place = self.swept.cell() / PLACES;
         for (block, &marks) in marks.iter().enumerate().filter(|(_, m)| **m != 0) {
             let mut marks = marks;
             while marks != 0 {
@@ -323,13 +315,13 @@ impl PartialSampler {
                 if i < columns {
                     let place = radii.radii[i];
                     distances[i] = known.value(place, || {
-                        let (column, r) = (place >> 16, f64::from(place) * per_place);
-                        stored(layer.swept.mended(&self.swept, column as usize, r))
+                        let (column, place) = cell_and_place(place);
+                        stored(layer.swept.size(&self.swept, column, place))
                     });
                 }
             }
         }
-        self.plane.mirror(&mut distances[..nx]);
+        self.plane.mirror(kernel, &mut distances[..nx]);
         // Lanes beyond the last voxel see what it sees.
         let last = distances[nx - 1];
         distances[nx..].fill(last);
@@ -430,13 +422,13 @@ impl PartialSampler {
     /// Distance to the section in the cap's plane, 0 in it, at a place where the table has none.
     fn edge(&self, layer: &Layer<'_>, place: u32) -> f32 {
         // The column as the lanes saw it.
-        let column = (place >> 16) as usize;
+        let (column, part) = cell_and_place(place);
         #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]
         let along = (f64::from(place) / PLACES + self.edges.columns().1 as f64) * self.edges.cell();
         if layer.crossed[column] && layer.body.section_holds([along, layer.height]) {
             return 0.0;
         }
-        stored(layer.edges.mended(&self.edges, column, along))
+        stored(layer.edges.size(&self.edges, column, part))
     }
 }
 

@@ -4,9 +4,14 @@
 //! it. A grid whose voxels lie alike on both sides of the axis needs only half of them, or a quarter.
 
 use crate::grid::GridSpec;
-use crate::math::{Dd, Real};
+use crate::math::{Dd, Kernel, Real};
 use rayon::prelude::*;
 use std::ops::Range;
+
+/// The cell of a radius, and the place in it from 0 to 1.
+pub(super) fn cell_and_place(radius: u32) -> (usize, f64) {
+    ((radius >> 16) as usize, f64::from(radius & 0xffff) / PLACES)
+}
 
 /// Voxels for which one cell number is kept: lanes of that many read cells from it on.
 pub(super) const BLOCK: usize = 8;
@@ -43,6 +48,38 @@ pub(super) struct Plane {
 pub(super) struct Radii<'a> {
     pub(super) radii: &'a [u32],
     pub(super) blocks: &'a [u32],
+}
+
+/// The two parts of a row.
+struct Mirror<'a> {
+    left: &'a [f32],
+    right: &'a mut [f32],
+}
+
+impl pulp::NullaryFnOnce for Mirror<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.run();
+    }
+}
+
+impl Mirror<'_> {
+    #[inline(always)]
+    fn run(self) {
+        // In parts of fixed length, which the compiler reverses in registers.
+        let (left, from) = self.left[..self.right.len()].as_chunks::<16>();
+        let (to, right) = self.right.as_rchunks_mut::<16>();
+        for (b, a) in right.iter_mut().rev().zip(left) {
+            let mut values = *a;
+            values.reverse();
+            *b = values;
+        }
+        for (b, a) in to.iter_mut().rev().zip(from) {
+            *b = *a;
+        }
+    }
 }
 
 /// The most radii that are kept: 256 MiB.
@@ -138,16 +175,12 @@ impl Plane {
     }
 
     /// Completes a row whose stored part is filled.
-    pub(super) fn mirror<T: Copy>(&self, row: &mut [T]) {
-        // In parts of fixed length, which the compiler reverses in registers.
+    pub(super) fn mirror(&self, kernel: Kernel, row: &mut [f32]) {
         let (left, right) = row.split_at_mut(self.stored);
-        let (left, from) = left[..right.len()].as_chunks::<16>();
-        let (to, right) = right.as_rchunks_mut::<16>();
-        for (b, a) in right.iter_mut().rev().zip(left) {
-            *b = std::array::from_fn(|n| a[15 - n]);
-        }
-        for (b, a) in to.iter_mut().rev().zip(from) {
-            *b = *a;
+        let job = Mirror { left, right };
+        match kernel.lanes() {
+            Some(arch) => arch.dispatch(job),
+            None => job.run(),
         }
     }
 

@@ -15,9 +15,9 @@
 use super::known::Known;
 use super::layer::{Cancel, stored};
 use super::memory::Stream;
-use super::plane::{BLOCK, PLACES, Plane};
-use super::queue::RowQueue;
-use super::spread::spread_rows;
+use super::plane::{BLOCK, PLACES, Plane, cell_and_place};
+use super::row_writer::RowWriter;
+use super::spread::spread;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real, Side};
 use crate::region::{Chain, Extent, MeridianField, RadialTable};
@@ -32,8 +32,6 @@ const NEAR: f64 = 2e-4;
 const WIDEST: f64 = 1.25;
 /// The most arcs a boundary is replaced by.
 const MOST_ARCS: usize = 20_000;
-/// Bytes written together past the caches: much more than a line, less than the nearest cache.
-const TOGETHER: usize = 1 << 14;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 
@@ -52,10 +50,10 @@ pub(super) struct RadialSampler {
 #[derive(Debug, Default)]
 pub(super) struct RadialScratch {
     table: RadialTable,
-    queue: RowQueue,
+    writer: RowWriter,
     doubts: Vec<u8>,
-    /// Voxels of those rows whose sign the exact path tells.
-    close: Vec<[usize; 2]>,
+    /// Voxels of a row whose sign the exact path tells.
+    close: Vec<usize>,
     /// Values that were mended.
     known: Known,
 }
@@ -140,62 +138,59 @@ impl RadialSampler {
         scratch.close.clear();
         scratch.known.clear();
         let rings = rings(body, grid, k);
+        // No surface is in a cell whose sign is asked.
+        let inside = |r| is_inside(&rings, r, 0.0).unwrap_or(false);
+        scratch.table.find_signs(&self.field, inside);
         let (columns, padded) = self.plane.stored();
         let blocks = padded / BLOCK;
         let rows = self.plane.len();
         let RadialScratch {
             table,
-            queue,
+            writer,
             doubts,
             close,
             known,
         } = scratch;
-        queue.start(nx, TOGETHER, padded);
-        let together = queue.room();
-        doubts.resize(together * blocks, 0);
-        let mut first = 0;
-        while first < rows {
-            let next = (first + together).min(rows);
-            let radii = self.plane.radii(first..next);
-            let to = (queue.ahead(), nx);
-            spread_rows(kernel, radii, table, self.near, to, (doubts, padded));
-            for (j, marks) in (first..next).zip(doubts.chunks(blocks)) {
-                let mend = Mend {
-                    table,
-                    rings: &rings,
-                    row: j,
-                    close,
-                    known,
-                };
-                let row = queue.waiting_row(j - first, false);
-                let part = &mut row[..columns];
-                self.mend(mend, marks, part);
-                if band.is_finite() {
-                    clamp(part, stored(band));
-                }
-                self.plane.mirror(row);
-                queue.add_ahead();
-                if self.plane.twin(j).is_some() {
-                    queue.add_behind();
-                }
+        writer.start(nx, padded);
+        doubts.resize(blocks, 0);
+        for j in 0..rows {
+            let radii = self.plane.radii(j..j + 1);
+            let row = writer.row();
+            spread(kernel, radii, table, self.near, &mut row[..padded], doubts);
+            let mend = Mend {
+                table,
+                rings: &rings,
+                radii: radii.radii,
+                close,
+                known,
+            };
+            let part = &mut row[..columns];
+            self.mend(mend, doubts, part);
+            if band.is_finite() {
+                clamp(part, stored(band));
             }
-            for [i, j] in close.drain(..) {
-                if writing.cancel.is_some_and(|cancel| cancel()) {
-                    return;
-                }
-                let twin = self.plane.twin(j).map(|j| (j, true));
-                for (row, downwards) in std::iter::once((j, false)).chain(twin) {
+            self.plane.mirror(kernel, &mut row[..nx]);
+            let twin = self.plane.twin(j).map(|j| (j, true));
+            for (row, is_twin) in std::iter::once((j, false)).chain(twin) {
+                for &i in &*close {
+                    if writing.cancel.is_some_and(|cancel| cancel()) {
+                        return;
+                    }
                     for i in std::iter::once(i).chain(self.plane.mirrored(i)) {
                         let point = grid.centre(i, row, k);
                         let inside = body.contains(point);
                         let distance = body.distance(point, inside, band);
-                        let value = stored(signed(distance, inside).clamp(-band, band));
-                        queue.waiting_row(j - first, downwards)[i] = value;
+                        writer.row()[i] = stored(signed(distance, inside).clamp(-band, band));
                     }
                 }
+                let last = j + 1 == rows;
+                if is_twin {
+                    writer.write_behind(writing.stream, out, last);
+                } else {
+                    writer.write_ahead(writing.stream, out, last);
+                }
             }
-            queue.write(writing.stream, out, next == rows);
-            first = next;
+            close.clear();
         }
     }
 
@@ -204,9 +199,20 @@ impl RadialSampler {
         (self.plane.bytes() + self.field.bytes()) as u64
     }
 
+    /// The distance where a cell does not tell its sign, or features must be searched; 0 where the sign is in question.
+    fn searched(&self, table: &RadialTable, rings: &[Ring], radius: u32) -> f32 {
+        let (cell, place) = cell_and_place(radius);
+        let size = table.size(&self.field, cell, place);
+        if let Some(sign) = table.sign(cell) {
+            return stored(sign * size);
+        }
+        let slack = self.field.cell() / PLACES;
+        let r = f64::from(radius) * slack;
+        is_inside(rings, r, slack).map_or(0.0, |inside| stored(signed(size, inside)))
+    }
+
     /// Fills in what the table left open of a row's stored part.
     fn mend(&self, at: Mend<'_>, marks: &[u8], part: &mut [f32]) {
-        let j = at.row;
         let (words, rest) = marks.as_chunks::<8>();
         let last = (
             words.len(),
@@ -221,35 +227,40 @@ impl RadialSampler {
                     break;
                 }
                 if part[i].is_nan() {
-                    let radius = self.plane.radii(j..j + 1).radii[i];
-                    part[i] = at.known.value(radius, || {
-                        let r = f64::from(radius) * self.field.cell() / PLACES;
-                        let distance = (at.table).mended(&self.field, (radius >> 16) as usize, r);
-                        let slack = self.field.cell() / PLACES;
-                        let around = |ring: &Ring| [ring.radius[0] - slack, ring.radius[1] + slack];
-                        if (at.rings.iter().map(around)).any(|[a, b]| a <= r && r <= b) {
-                            // The ring is in question: on the surface, or near one whose radius is not well known.
-                            return 0.0;
-                        }
-                        let ring = at.rings.iter().find(|ring| r <= ring.radius[1]);
-                        let inside = ring.is_some_and(|ring| ring.side != Side::Outside);
-                        stored(signed(distance, inside))
-                    });
+                    let radius = at.radii[i];
+                    let (cell, place) = cell_and_place(radius);
+                    part[i] = match at.table.signed(&self.field, cell, place) {
+                        Some(distance) => stored(distance),
+                        None => at
+                            .known
+                            .value(radius, || self.searched(at.table, at.rings, radius)),
+                    };
                 }
                 if !(part[i].abs() >= self.near) {
-                    at.close.push([i, j]);
+                    at.close.push(i);
                 }
             }
         }
     }
 }
 
+/// Whether a radius is within the solid; `None` where the ring is in question: on the surface, or near one whose radius
+/// is not well known.
+fn is_inside(rings: &[Ring], r: f64, slack: f64) -> Option<bool> {
+    let around = |ring: &Ring| [ring.radius[0] - slack, ring.radius[1] + slack];
+    if rings.iter().map(around).any(|[a, b]| a <= r && r <= b) {
+        return None;
+    }
+    let ring = rings.iter().find(|ring| r <= ring.radius[1]);
+    Some(ring.is_some_and(|ring| ring.side != Side::Outside))
+}
+
 /// What a row is mended from.
 struct Mend<'a> {
     table: &'a RadialTable,
     rings: &'a [Ring],
-    row: usize,
-    close: &'a mut Vec<[usize; 2]>,
+    radii: &'a [u32],
+    close: &'a mut Vec<usize>,
     known: &'a mut Known,
 }
 

@@ -28,8 +28,8 @@ use super::bits::SideBits;
 use super::blocks::{BlockLayer, BlockScratch};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, LayerView, Marks, Points, look_up, look_up_ridge, reach};
-use super::queue::RowQueue;
 use super::radial::{Writing, clamp};
+use super::row_writer::RowWriter;
 use super::wedge::Wedge;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Real};
@@ -47,8 +47,6 @@ const PER_SQUARE: u64 = 5000;
 pub(super) const NEAR: f64 = 2e-4;
 /// The most arcs a boundary is replaced by.
 pub(super) const MOST_ARCS: usize = 20_000;
-/// Bytes written together past the caches: much more than a line, much less than a cache.
-pub(super) const TOGETHER: usize = 1 << 16;
 /// Finest arcs, in the region's unit: below it their own rounding counts.
 const FINEST: f64 = 1e-12;
 /// What world coordinates may be rounded by, as a share of the least spacing.
@@ -84,7 +82,7 @@ pub(super) struct TiltedScratch {
     blocks: BlockScratch,
     marks: Vec<Marks>,
     /// Rows that wait to be written together.
-    queue: RowQueue,
+    writer: RowWriter,
     close: Vec<Close>,
 }
 
@@ -225,16 +223,15 @@ impl TiltedSampler {
         let TiltedScratch {
             lanes,
             marks,
-            queue,
+            writer,
             close,
             ..
         } = scratch;
         marks.resize(padded / LANES, Marks::default());
-        queue.start(nx, TOGETHER, LANES);
+        writer.start(nx, LANES);
         let band = stored(writing.band);
         for j in 0..ny {
-            let at = queue.waiting() * nx;
-            let row = &mut queue.ahead()[at..at + padded];
+            let row = &mut writer.row()[..padded];
             let found = (self.near(), &mut **marks);
             self.row(writing.kernel, (view, [0, j]), lanes, found, row);
             let row = &mut row[..nx];
@@ -246,11 +243,7 @@ impl TiltedSampler {
             if writing.cancel.is_some_and(|cancel| cancel()) {
                 return;
             }
-            queue.add_ahead();
-            let last = j + 1 == ny;
-            if queue.is_full() || last {
-                queue.write(writing.stream, out, last);
-            }
+            writer.write_ahead(writing.stream, out, j + 1 == ny);
         }
     }
 

@@ -16,9 +16,9 @@ use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapRow, GROUP, GUARD, LEAST_SINE, combined};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, Marks, Points, look_up, look_up_cap_ridge};
-use super::queue::RowQueue;
 use super::radial::{KnownLayer, Writing};
-use super::tilted::{ARCS, CELLS, MOST_ARCS, NEAR, TOGETHER, TiltedSampler, pays, step_for};
+use super::row_writer::RowWriter;
+use super::tilted::{ARCS, CELLS, MOST_ARCS, NEAR, TiltedSampler, pays, step_for};
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Real};
 use crate::region::{CellTable, Chain, Extent, MeridianField};
@@ -58,7 +58,7 @@ pub(super) struct TiltedCapScratch {
     /// Distances of a row from the swept surface.
     distances: Vec<f32>,
     groups: CapScratch,
-    queue: RowQueue,
+    writer: RowWriter,
 }
 
 /// One layer as its rows see it.
@@ -161,18 +161,14 @@ impl TiltedCaps {
         scratch.marks.resize(padded / LANES, Marks::default());
         scratch.distances.resize(padded, 0.0);
         scratch.groups.resize(padded);
-        scratch.queue.start(nx, TOGETHER, LANES);
+        scratch.writer.start(nx, LANES);
         for j in 0..ny {
             if writing.cancel.is_some_and(|cancel| cancel()) {
                 return;
             }
             self.row(&layer, swept, j, scratch);
-            let queue = &mut scratch.queue;
-            queue.add_ahead();
             let last = j + 1 == ny;
-            if queue.is_full() || last {
-                queue.write(writing.stream, out, last);
-            }
+            scratch.writer.write_ahead(writing.stream, out, last);
         }
     }
 
@@ -203,7 +199,7 @@ impl TiltedCaps {
             marks,
             distances,
             groups,
-            queue,
+            writer,
         } = scratch;
         let k = layer.known.k;
         let nx = layer.grid.dims()[0];
@@ -234,8 +230,7 @@ impl TiltedCaps {
             least: self.near.min(band),
             band,
         };
-        let start = queue.waiting() * nx;
-        let out = &mut queue.ahead()[start..start + self.x.len()];
+        let out = &mut writer.row()[..self.x.len()];
         groups.fill(kernel, line, out, |range, edges| {
             let marks = &mut marks[..range.len() / LANES];
             let points = Points::Caps(row, &self.x[range], height);
