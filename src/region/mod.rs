@@ -48,7 +48,7 @@ pub(crate) use field::{Extent, MeridianField};
 pub(crate) use moments::{Estimate, SectionMoments};
 pub(crate) use piece::Piece;
 pub(crate) use polynomials::{Polynomial, PolynomialTable, SQUARE};
-pub(crate) use radial::{GROUP, Group, RadialTable};
+pub(crate) use radial::{Cubics, GROUP, Group, RadialTable};
 pub(crate) use section::Section;
 pub(crate) use tree::{Box2, BoxTree};
 pub(crate) use weld::welded;

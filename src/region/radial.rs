@@ -34,6 +34,10 @@ pub(crate) type Group = [[f32; GROUP]; 5];
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RadialTable {
     groups: Vec<Group>,
+    /// The second cubics of cells with a ridge; [`UNUSED`] elsewhere.
+    seconds: Vec<Group>,
+    /// Whether a group has any, 1 or 0.
+    ridged: Vec<u8>,
     /// Whether what the first coefficients lost is kept, as some distances are large.
     precise: bool,
     leaves: Vec<u32>,
@@ -43,8 +47,21 @@ pub(crate) struct RadialTable {
     /// What may be nearest in them.
     parts: Vec<Part>,
     kernel: Kernel,
+    /// Values to which the rounding of the first coefficients does not count.
+    small: f32,
     height: f64,
     scale: f64,
+}
+
+/// Cubics in groups: the value is that of the first or of the second, whichever is nearer to 0.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cubics<'a> {
+    pub(crate) groups: &'a [Group],
+    pub(crate) seconds: &'a [Group],
+    /// Whether a group has second ones, 1 or 0; all are [`UNUSED`] where it has none.
+    pub(crate) ridged: &'a [u8],
+    /// Whether the last coefficients count.
+    pub(crate) precise: bool,
 }
 
 /// A cell without one cubic.
@@ -84,6 +101,13 @@ const SMALL: f64 = 4_194_304.0;
 /// Value of the columns that are left out: further away than anything, and its square has a root by
 /// [`crate::math::root`].
 pub(crate) const UNUSED: f32 = 1e17;
+const NO_SECOND: Group = [
+    [UNUSED; GROUP],
+    [0.0; GROUP],
+    [0.0; GROUP],
+    [0.0; GROUP],
+    [0.0; GROUP],
+];
 /// Features that may follow each other within one cell.
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
@@ -122,6 +146,14 @@ impl RadialTable {
         self.groups.resize(groups, [[0.0; GROUP]; 5]);
         self.groups[columns / GROUP..].fill([[0.0; GROUP]; 5]);
         (0..start).for_each(|k| self.settle(k, UNUSED));
+        for (group, ridged) in self.seconds.iter_mut().zip(&mut self.ridged) {
+            if *ridged != 0 {
+                *group = NO_SECOND;
+            }
+            *ridged = 0;
+        }
+        self.seconds.resize(groups, NO_SECOND);
+        self.ridged.resize(groups, 0);
         self.leaves.resize(columns, 0);
         self.open.resize(columns, OpenCell::default());
         self.opened.clear();
@@ -156,6 +188,7 @@ impl RadialTable {
         });
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
         let small = (SMALL * tolerance * scale) as f32;
+        self.small = small;
         let large = |v: &f32| v.abs() > small && *v != UNUSED;
         self.precise = self.groups.iter().any(|g| g[0].iter().any(large));
         if !self.precise {
@@ -165,9 +198,14 @@ impl RadialTable {
         }
     }
 
-    /// The coefficients in groups, with some beyond the last cell's; and whether the last of them count.
-    pub(crate) fn groups(&self) -> (&[Group], bool) {
-        (&self.groups, self.precise)
+    /// The coefficients in groups, with some beyond the last cell's.
+    pub(crate) fn cubics(&self) -> Cubics<'_> {
+        Cubics {
+            groups: &self.groups,
+            seconds: &self.seconds,
+            ridged: &self.ridged,
+            precise: self.precise,
+        }
     }
 
     /// The value where a cell begins, not a number where it has no cubic.
@@ -276,7 +314,20 @@ impl RadialTable {
                     self.parts.truncate(start);
                 }
             }
-            self.leave_open(from, start);
+            if let [
+                Part {
+                    form: Form::Cubic(cubic),
+                    from: 0.0,
+                    to: 1.0,
+                },
+            ] = self.parts[start..]
+            {
+                // Features hand over within it, but not by much.
+                self.parts.truncate(start);
+                store(&mut self.groups[from / GROUP], from % GROUP, cubic);
+            } else {
+                self.leave_open(from, start);
+            }
         }
     }
 
@@ -295,14 +346,25 @@ impl RadialTable {
             self.parts.push(Part { form, from, to });
             return true;
         }
-        self.add_run(chain, feet, Stretch { ends, places }, |feature| {
+        let start = self.parts.len();
+        let mut worst = 0.0_f64;
+        let found = self.add_run(chain, feet, Stretch { ends, places }, |feature| {
             let [a, b] = ends.map(|q| chain.local(feature, q));
-            if smooth_error(h, a.bend.abs().max(b.bend.abs())) <= row.tolerance {
+            let error = smooth_error(h, a.bend.abs().max(b.bend.abs()));
+            worst = worst.max(error);
+            if error <= row.tolerance {
                 Form::Cubic(cubic([&a, &b], scale, length))
             } else {
                 Form::Feature(feature)
             }
-        })
+        });
+        if found && let Some(one) = joined(&self.parts[start..], (row.tolerance - worst) * scale) {
+            self.parts.truncate(start);
+            let [from, to] = places;
+            let form = Form::Cubic(one);
+            self.parts.push(Part { form, from, to });
+        }
+        found
     }
 
     /// Adds the features of a run, each up to the normal at which it hands over to the next. Whether all were found.
@@ -311,7 +373,7 @@ impl RadialTable {
         chain: &Chain,
         [near, far]: [&Foot; 2],
         stretch: Stretch,
-        form: impl Fn(u32) -> Form,
+        mut form: impl FnMut(u32) -> Form,
     ) -> bool {
         let Some(features) = chain.between(near.feature, far.feature, MOST_JOINTS) else {
             return false;
@@ -361,12 +423,8 @@ impl RadialTable {
                 part * (b + t * (2.0 * c + 3.0 * t * d)),
                 part * part * (c + 3.0 * t * d),
                 part * part * part * d,
-                value - f64::from(value as f32),
             ];
-            let group = &mut self.groups[k / GROUP];
-            for (row, v) in group.iter_mut().zip(coefficients) {
-                row[k % GROUP] = v as f32;
-            }
+            store(&mut self.groups[k / GROUP], k % GROUP, coefficients);
         }
     }
 
@@ -378,9 +436,37 @@ impl RadialTable {
             // No distance changes by more than the way.
             if self.size(field, cell, 0.0) > reach {
                 let r = self.radius(field, cell, 0.5);
-                self.open[cell].sign = if inside(r) { -1.0 } else { 1.0 };
+                let sign = if inside(r) { -1.0 } else { 1.0 };
+                self.open[cell].sign = sign;
+                self.close_ridge(cell, sign);
             }
         }
+    }
+
+    /// Gives a cell with a ridge between two cubics both of them, with that sign.
+    fn close_ridge(&mut self, cell: usize, sign: f64) {
+        let OpenCell { first, count, .. } = self.open[cell];
+        let [one, other] = &self.parts[first as usize..][..count as usize] else {
+            return;
+        };
+        if [one, other].iter().any(|p| [p.from, p.to] != [0.0, 1.0]) {
+            return;
+        }
+        let (Form::Cubic(one), Form::Cubic(other)) = (one.form, other.form) else {
+            return;
+        };
+        // Neither is 0 in the cell.
+        let signed = |c: [f64; 4]| c.map(|v| v * sign * c[0].signum());
+        let (group, lane) = (cell / GROUP, cell % GROUP);
+        self.precise |= one[0].abs().max(other[0].abs()) > f64::from(self.small);
+        for (groups, cubic) in [(&mut self.groups, one), (&mut self.seconds, other)] {
+            let group = &mut groups[group];
+            store(group, lane, signed(cubic));
+            if !self.precise {
+                group[4][lane] = 0.0;
+            }
+        }
+        self.ridged[group] = 1;
     }
 
     /// The signed distance in scene units at a place in a cell without a cubic, from 0 to 1 in it, where it is to be had
@@ -442,6 +528,80 @@ fn cubic([near, far]: [&Local; 2], scale: f64, length: f64) -> [f64; 4] {
     [a, da, 3.0 * rise - 2.0 * da - db, da + db - 2.0 * rise]
 }
 
+/// One cubic for all parts of a cell, none of which it differs from by more than `tolerance`.
+fn joined(parts: &[Part], tolerance: f64) -> Option<[f64; 4]> {
+    let at = |t: f64| -> Option<f64> {
+        let part = parts.iter().find(|p| t <= p.to)?;
+        match part.form {
+            Form::Cubic([a, b, c, d]) => Some(a + t * (b + t * (c + t * d))),
+            Form::Feature(_) | Form::Leaf => None,
+        }
+    };
+    // Through the four places that leave a cubic the least error.
+    let mut values = [0.0; 4];
+    for (value, place) in values.iter_mut().zip(CHEBYSHEV) {
+        *value = at(place)?;
+    }
+    let one = through(values);
+    let near = |part: &Part| match part.form {
+        Form::Cubic(c) => {
+            let rest: [f64; 4] = std::array::from_fn(|n| one[n] - c[n]);
+            bound(rest, [part.from, part.to]) <= tolerance
+        }
+        Form::Feature(_) | Form::Leaf => false,
+    };
+    parts.iter().all(near).then_some(one)
+}
+
+/// (1 - cos((2 i + 1) π / 8)) / 2
+const CHEBYSHEV: [f64; 4] = [
+    0.038_060_233_744_356_62,
+    0.308_658_283_817_455_1,
+    0.691_341_716_182_544_9,
+    0.961_939_766_255_643_4,
+];
+
+/// The cubic through values at those places, by Newton's divided differences.
+fn through(values: [f64; 4]) -> [f64; 4] {
+    let x = CHEBYSHEV;
+    let mut d = values;
+    for order in 1..4 {
+        for n in (order..4).rev() {
+            d[n] = (d[n] - d[n - 1]) / (x[n] - x[n - order]);
+        }
+    }
+    // As powers, from the last factor inwards.
+    let mut c = [d[3], 0.0, 0.0, 0.0];
+    for n in (0..3).rev() {
+        c = [
+            d[n] - x[n] * c[0],
+            c[0] - x[n] * c[1],
+            c[1] - x[n] * c[2],
+            c[2] - x[n] * c[3],
+        ];
+    }
+    c
+}
+
+/// A bound on the size of a cubic between two places: that of its Bernstein coefficients.
+fn bound([a, b, c, d]: [f64; 4], [from, to]: [f64; 2]) -> f64 {
+    let h = to - from;
+    // About the first place, over the stretch.
+    let p = [
+        a + from * (b + from * (c + from * d)),
+        h * (b + from * (2.0 * c + from * 3.0 * d)),
+        h * h * (c + 3.0 * from * d),
+        h * h * h * d,
+    ];
+    let bernstein = [
+        p[0],
+        p[0] + p[1] / 3.0,
+        p[0] + (2.0 * p[1] + p[2]) / 3.0,
+        p[0] + p[1] + p[2] + p[3],
+    ];
+    bernstein.iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+}
+
 /// A part of a row in one cell: its ends, and their places in the cell.
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
@@ -454,6 +614,19 @@ impl Stretch {
     fn place(&self, part: f64) -> f64 {
         let [from, to] = self.places;
         from + part * (to - from)
+    }
+}
+
+/// Gives a lane of a group its coefficients.
+#[inline]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "coefficients are f32: the stored voxels are"
+)]
+fn store(group: &mut Group, lane: usize, [a, b, c, d]: [f64; 4]) {
+    let lost = a - f64::from(a as f32);
+    for (row, v) in group.iter_mut().zip([a, b, c, d, lost]) {
+        row[lane] = v as f32;
     }
 }
 
@@ -856,7 +1029,8 @@ pub(super) mod tests {
                 let built = began.elapsed();
                 let mut table = RadialTable::default();
                 let mut number = numbers(7);
-                let (mut worst, mut special, mut all, mut signs) = (0.0_f64, 0_u32, 0_u32, 0_u32);
+                let (mut worst, mut special, mut all) = (0.0_f64, 0_u32, 0_u32);
+                let (mut signs, mut ridges) = (0_u32, 0_u32);
                 let (columns, _) = field.columns();
                 let mut time = std::time::Duration::ZERO;
                 for _ in 0..60 {
@@ -872,11 +1046,18 @@ pub(super) mod tests {
                         #[allow(clippy::cast_precision_loss, reason = "a small count")]
                         let r = (k as f64 + t) * cell;
                         let truth = exact.distance([r, z], f64::INFINITY);
-                        let [a, b, c, d, lost] = std::array::from_fn(|i| {
-                            f64::from(table.groups[k / GROUP][i][k % GROUP])
-                        });
+                        let value = |groups: &[Group]| {
+                            let [a, b, c, d, lost] =
+                                std::array::from_fn(|i| f64::from(groups[k / GROUP][i][k % GROUP]));
+                            a + (lost + t * (b + t * (c + t * d)))
+                        };
+                        let cubics = table.cubics();
+                        let (v, second) = (value(cubics.groups), value(cubics.seconds));
+                        let has_second = second != f64::from(UNUSED);
+                        assert!(!has_second || cubics.ridged[k / GROUP] == 1);
+                        ridges += u32::from(has_second);
                         all += 1;
-                        let found = if a.is_nan() {
+                        let found = if v.is_nan() {
                             special += 1;
                             let inside =
                                 region.section().side_of(r, z) != crate::math::Side::Outside;
@@ -888,7 +1069,7 @@ pub(super) mod tests {
                             signs += u32::from(sign.is_some());
                             table.size(&field, k, t)
                         } else {
-                            let v: f64 = a + (lost + t * (b + t * (c + t * d)));
+                            let v = if second.abs() < v.abs() { second } else { v };
                             let inside =
                                 region.section().side_of(r, z) != crate::math::Side::Outside;
                             assert!(
@@ -902,16 +1083,17 @@ pub(super) mod tests {
                         assert!(
                             error < 6.2e-5 * cell,
                             "{name} {voxels}: {found} for {truth} at {r} {z}, cell {cell}, {}",
-                            a.is_nan()
+                            v.is_nan()
                         );
                     }
                 }
                 let (leaves, smooth) = field.census();
                 eprintln!(
-                    "{name:>9} {voxels:>5}: {features} features, {leaves} leaves, {smooth} smooth, {built:?}; tables {:?} each, {:.2}% mended, {:.0}% of them with a sign, worst {worst:.1e} of a cell",
+                    "{name:>9} {voxels:>5}: {features} features, {leaves} leaves, {smooth} smooth, {built:?}; tables {:?} each, {:.2}% mended, {:.0}% of them with a sign, {:.2}% with a ridge, worst {worst:.1e} of a cell",
                     time / 60,
                     100.0 * f64::from(special) / f64::from(all),
-                    100.0 * f64::from(signs) / f64::from(special)
+                    100.0 * f64::from(signs) / f64::from(special),
+                    100.0 * f64::from(ridges) / f64::from(all)
                 );
             }
         }

@@ -168,6 +168,8 @@ impl PartialSampler {
         let (scale, tolerance) = (frame.scale(), self.tolerance);
         let kernel = writing.kernel;
         (scratch.swept).fill(kernel, &self.swept, height, scale, tolerance);
+        // The membership tells the signs.
+        scratch.swept.find_signs(&self.swept, |_| false);
         let start = self.first_used(&scratch.swept, scale);
         (scratch.edges).fill_from(start, kernel, &self.edges, height, scale, tolerance);
         self.settle(body, height, &mut scratch.edges, &mut scratch.crossed);
@@ -272,8 +274,15 @@ impl PartialSampler {
         crossed.resize(columns, false);
         let cell = self.edges.cell();
         let clear = CLEAR * cell * body.frame().scale();
+        table.find_signs(&self.edges, |a| body.section_holds([a, height]));
         for (k, crossed) in crossed.iter_mut().enumerate() {
             if !table.is_open(k) {
+                continue;
+            }
+            if let Some(sign) = table.sign(k) {
+                if sign < 0.0 {
+                    table.settle(k, -1.0);
+                }
                 continue;
             }
             #[allow(clippy::cast_precision_loss, reason = "cell numbers are below 2^17")]

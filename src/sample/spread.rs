@@ -7,6 +7,9 @@
 //! A row's radii rise and fall by at most a cell from voxel to voxel, so neighbours find their coefficients among a few
 //! in registers: lanes permute instead of gathering.
 //!
+//! Cells with a ridge have two cubics, of which the one nearer to 0 counts. Blocks whose cells are in groups without any
+//! do not look for a second.
+//!
 //! c4 is what c0 lost when it became an f32, so that the sum in brackets, at most some cells in size, is all that is
 //! rounded before the last addition.
 //!
@@ -15,7 +18,7 @@
 
 use super::plane::{BLOCK, REACH, Radii, SCATTERED};
 use crate::math::Kernel;
-use crate::region::{GROUP, Group, RadialTable};
+use crate::region::{Cubics, GROUP, Group, RadialTable};
 #[cfg(target_arch = "x86_64")]
 use pulp::Arch;
 
@@ -28,82 +31,25 @@ pub(super) fn spread(
     out: &mut [f32],
     doubts: &mut [u8],
 ) {
-    let length = at.radii.len();
-    spread_rows(kernel, at, table, least, (out, length), (doubts, length));
-}
-
-/// The same for rows of `length` radii each: the values of each are written `stride` after those of the one before, in
-/// their order, so that what fills a row's last block may be overwritten by the next.
-pub(super) fn spread_rows(
-    kernel: Kernel,
-    at: Radii<'_>,
-    table: &RadialTable,
-    least: f32,
-    (out, stride): (&mut [f32], usize),
-    (doubts, length): (&mut [u8], usize),
-) {
-    let (table, precise) = table.groups();
     let job = Spread {
         at,
-        table,
-        precise,
+        table: table.cubics(),
         least,
         out,
         doubts,
     };
-    let mut rows = Rows {
-        job,
-        length,
-        stride,
-    };
     match kernel.lanes() {
         #[cfg(target_arch = "x86_64")]
-        Some(Arch::V4(simd)) => simd.vectorize(Wide512(simd, rows)),
+        Some(Arch::V4(simd)) => simd.vectorize(Wide512(simd, job)),
         #[cfg(target_arch = "x86_64")]
-        Some(Arch::V3(simd)) => simd.vectorize(Wide256(simd, rows)),
-        _ => (0..rows.count()).for_each(|n| rows.row(n).run(0)),
-    }
-}
-
-/// Rows of radii and of values.
-struct Rows<'a> {
-    job: Spread<'a>,
-    length: usize,
-    stride: usize,
-}
-
-impl Rows<'_> {
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.job.at.radii.len() / self.length.max(1)
-    }
-
-    /// One row.
-    #[inline(always)]
-    fn row(&mut self, n: usize) -> Spread<'_> {
-        let Self {
-            job,
-            length,
-            stride,
-        } = self;
-        let blocks = length.div_ceil(BLOCK);
-        Spread {
-            at: Radii {
-                radii: &job.at.radii[n * *length..(n + 1) * *length],
-                blocks: &job.at.blocks[n * blocks..(n + 1) * blocks],
-            },
-            out: &mut job.out[n * *stride..n * *stride + *length],
-            doubts: &mut job.doubts[n * blocks..(n + 1) * blocks],
-            ..*job
-        }
+        Some(Arch::V3(simd)) => simd.vectorize(Wide256(simd, job)),
+        _ => job.run(0),
     }
 }
 
 struct Spread<'a> {
     at: Radii<'a>,
-    table: &'a [Group],
-    /// Whether c4 counts; it is 0 where it does not.
-    precise: bool,
+    table: Cubics<'a>,
     least: f32,
     out: &'a mut [f32],
     doubts: &'a mut [u8],
@@ -123,28 +69,40 @@ impl Spread<'_> {
 
 /// One block.
 #[inline(always)]
-fn plain(table: &[Group], least: f32, radii: &[u32], out: &mut [f32]) -> u8 {
+fn plain(table: Cubics<'_>, least: f32, radii: &[u32], out: &mut [f32]) -> u8 {
     let mut doubts = 0;
     for n in 0..radii.len() {
         let cell = (radii[n] >> 16) as usize;
-        let (group, cell) = (&table[cell / GROUP], cell % GROUP);
         #[allow(clippy::cast_precision_loss, reason = "16 bits")]
         let t = (radii[n] & 0xffff) as f32 * (1.0 / 65_536.0);
-        let value = t * group[3][cell];
-        let value = t * (group[2][cell] + value);
-        let value = t * (group[1][cell] + value);
-        let value = group[0][cell] + (group[4][cell] + value);
+        let mut value = plain_cubic(&table.groups[cell / GROUP], cell % GROUP, t);
+        if table.ridged[cell / GROUP] != 0 {
+            let second = plain_cubic(&table.seconds[cell / GROUP], cell % GROUP, t);
+            value = if second.abs() < value.abs() {
+                second
+            } else {
+                value
+            };
+        }
         out[n] = value;
         doubts |= u8::from(!(value.abs() >= least)) << n;
     }
     doubts
 }
 
+#[inline(always)]
+fn plain_cubic(group: &Group, cell: usize, t: f32) -> f32 {
+    let value = t * group[3][cell];
+    let value = t * (group[2][cell] + value);
+    let value = t * (group[1][cell] + value);
+    group[0][cell] + (group[4][cell] + value)
+}
+
 // What the wide loops call is `inline(always)` and no closure: a call would leave the function that has the
 // instructions switched on.
 
 #[cfg(target_arch = "x86_64")]
-struct Wide512<'a>(pulp::x86::V4, Rows<'a>);
+struct Wide512<'a>(pulp::x86::V4, Spread<'a>);
 
 /// Coefficient `c` of the cells that two groups hold.
 #[cfg(target_arch = "x86_64")]
@@ -165,16 +123,32 @@ impl pulp::NullaryFnOnce for Wide512<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self(simd, mut rows) = self;
-        let precise = rows.job.precise;
-        for n in 0..rows.count() {
-            if precise {
-                run_512::<true>(simd, rows.row(n));
-            } else {
-                run_512::<false>(simd, rows.row(n));
-            }
+        let Self(simd, job) = self;
+        if job.table.precise {
+            run_512::<true>(simd, job);
+        } else {
+            run_512::<false>(simd, job);
         }
     }
+}
+
+/// The cubics of cells that two groups hold.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn cubic_512<const PRECISE: bool>(
+    simd: pulp::x86::V4,
+    groups: &[Group; 2],
+    cell: std::arch::x86_64::__m512i,
+    t: std::arch::x86_64::__m512,
+) -> std::arch::x86_64::__m512 {
+    let f = simd.avx512f;
+    let value = f._mm512_mul_ps(t, choose_512(simd, groups, 3, cell));
+    let value = f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, groups, 2, cell), value));
+    let mut value = f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, groups, 1, cell), value));
+    if PRECISE {
+        value = f._mm512_add_ps(choose_512(simd, groups, 4, cell), value);
+    }
+    f._mm512_add_ps(choose_512(simd, groups, 0, cell), value)
 }
 
 /// Two blocks at a time, whose cells two groups hold.
@@ -185,7 +159,6 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
     let Spread {
         at,
         table,
-        precise,
         least,
         out,
         doubts,
@@ -207,7 +180,7 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
         let [p, q] = blocks[n];
         let first = p.min(q) / 16;
         let near = p.max(q) - 16 * first <= 32 - REACH;
-        let (Some(groups), true) = (pair(table, first as usize), near) else {
+        let (Some((groups, seconds)), true) = (pair(table, first as usize), near) else {
             marks[n] = [
                 plain(table, least, &radii[..BLOCK], &mut values[..BLOCK]),
                 plain(table, least, &radii[BLOCK..], &mut values[BLOCK..]),
@@ -220,14 +193,14 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
             f._mm512_set1_epi32((16 * first).cast_signed()),
         );
         let t = f._mm512_mul_ps(f._mm512_cvtepi32_ps(f._mm512_and_si512(radius, low)), part);
-        let value = f._mm512_mul_ps(t, choose_512(simd, groups, 3, cell));
-        let value = f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, groups, 2, cell), value));
-        let mut value =
-            f._mm512_mul_ps(t, f._mm512_add_ps(choose_512(simd, groups, 1, cell), value));
-        if PRECISE {
-            value = f._mm512_add_ps(choose_512(simd, groups, 4, cell), value);
+        let mut value = cubic_512::<PRECISE>(simd, groups, cell, t);
+        if let Some(seconds) = seconds {
+            let second = cubic_512::<PRECISE>(simd, seconds, cell, t);
+            // 17: less, and not where one is no number.
+            let nearer =
+                f._mm512_cmp_ps_mask::<17>(f._mm512_abs_ps(second), f._mm512_abs_ps(value));
+            value = f._mm512_mask_mov_ps(value, nearer, second);
         }
-        let value = f._mm512_add_ps(choose_512(simd, groups, 0, cell), value);
         *values = pulp::cast(value);
         let mask = f._mm512_cmp_ps_mask::<9>(f._mm512_abs_ps(value), limit);
         marks[n] = mask.to_le_bytes();
@@ -237,7 +210,6 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
         Spread {
             at,
             table,
-            precise,
             least,
             out,
             doubts,
@@ -246,18 +218,30 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
     }
 }
 
-/// Two groups that follow each other; `None` at the end of the table.
+/// Two groups that follow each other, and their second cubics where they have any; `None` at the end of the table.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn pair(table: &[Group], first: usize) -> Option<&[Group; 2]> {
-    match table.get(first..) {
+fn pair(table: Cubics<'_>, first: usize) -> Option<(&[Group; 2], Option<&[Group; 2]>)> {
+    let groups = two(table.groups, first)?;
+    let seconds = match two(table.ridged, first) {
+        Some([0, 0]) | None => None,
+        Some(_) => two(table.seconds, first),
+    };
+    Some((groups, seconds))
+}
+
+/// Two that follow each other; `None` at the end.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn two<T>(list: &[T], first: usize) -> Option<&[T; 2]> {
+    match list.get(first..) {
         Some(rest) => rest.first_chunk::<2>(),
         None => None,
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-struct Wide256<'a>(pulp::x86::V3, Rows<'a>);
+struct Wide256<'a>(pulp::x86::V3, Spread<'a>);
 
 /// Coefficient `c` of the 16 cells from half a group on; `upper` has the sign where the cell is in their second half.
 #[cfg(target_arch = "x86_64")]
@@ -290,11 +274,35 @@ impl pulp::NullaryFnOnce for Wide256<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self(simd, mut rows) = self;
-        for n in 0..rows.count() {
-            run_256(simd, rows.row(n));
-        }
+        let Self(simd, job) = self;
+        run_256(simd, job);
     }
+}
+
+/// The cubics of cells that two groups hold from half a group on.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn cubic_256(
+    simd: pulp::x86::V3,
+    (groups, half, precise): (&[Group; 2], usize, bool),
+    cell: std::arch::x86_64::__m256i,
+    upper: std::arch::x86_64::__m256,
+    t: std::arch::x86_64::__m256,
+) -> std::arch::x86_64::__m256 {
+    let f = simd.avx;
+    let value = f._mm256_mul_ps(t, choose_256(simd, groups, [3, half], cell, upper));
+    let value = f._mm256_mul_ps(
+        t,
+        f._mm256_add_ps(choose_256(simd, groups, [2, half], cell, upper), value),
+    );
+    let mut value = f._mm256_mul_ps(
+        t,
+        f._mm256_add_ps(choose_256(simd, groups, [1, half], cell, upper), value),
+    );
+    if precise {
+        value = f._mm256_add_ps(choose_256(simd, groups, [4, half], cell, upper), value);
+    }
+    f._mm256_add_ps(choose_256(simd, groups, [0, half], cell, upper), value)
 }
 
 /// A block at a time, whose cells are among 16 from half a group on.
@@ -305,7 +313,6 @@ fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
     let Spread {
         at,
         table,
-        precise,
         least,
         out,
         doubts,
@@ -319,7 +326,9 @@ fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
     for n in 0..radii.len() {
         let (radii, values) = (&radii[n], &mut values[n]);
         let first = at.blocks[n];
-        let (Some(g), true) = (pair(table, first as usize / 16), first != SCATTERED) else {
+        let (Some((groups, seconds)), true) =
+            (pair(table, first as usize / 16), first != SCATTERED)
+        else {
             doubts[n] = plain(table, least, radii, values);
             continue;
         };
@@ -332,19 +341,13 @@ fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
         // Cells from 8 on come from the second half: their bit 3, moved to the sign.
         let upper = f._mm256_castsi256_ps(i._mm256_slli_epi32::<28>(cell));
         let t = f._mm256_mul_ps(f._mm256_cvtepi32_ps(i._mm256_and_si256(radius, low)), part);
-        let value = f._mm256_mul_ps(t, choose_256(simd, g, [3, half], cell, upper));
-        let value = f._mm256_mul_ps(
-            t,
-            f._mm256_add_ps(choose_256(simd, g, [2, half], cell, upper), value),
-        );
-        let mut value = f._mm256_mul_ps(
-            t,
-            f._mm256_add_ps(choose_256(simd, g, [1, half], cell, upper), value),
-        );
-        if precise {
-            value = f._mm256_add_ps(choose_256(simd, g, [4, half], cell, upper), value);
+        let precise = table.precise;
+        let mut value = cubic_256(simd, (groups, half, precise), cell, upper, t);
+        if let Some(seconds) = seconds {
+            let second = cubic_256(simd, (seconds, half, precise), cell, upper, t);
+            let [near, far] = [second, value].map(|v| f._mm256_andnot_ps(sign, v));
+            value = f._mm256_blendv_ps(value, second, f._mm256_cmp_ps::<17>(near, far));
         }
-        let value = f._mm256_add_ps(choose_256(simd, g, [0, half], cell, upper), value);
         *values = pulp::cast(value);
         let size = f._mm256_andnot_ps(sign, value);
         let mask = f._mm256_movemask_ps(f._mm256_cmp_ps::<9>(size, limit));
@@ -362,7 +365,6 @@ fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
         Spread {
             at,
             table,
-            precise,
             least,
             out,
             doubts,
