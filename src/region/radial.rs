@@ -36,8 +36,8 @@ pub(crate) struct RadialTable {
     groups: Vec<Group>,
     /// The second cubics of cells with a ridge; [`UNUSED`] elsewhere.
     seconds: Vec<Group>,
-    /// Whether a group has any, 1 or 0.
-    ridged: Vec<u8>,
+    /// A bit for each cell of a group that has one.
+    ridged: Vec<u16>,
     /// Whether what the first coefficients lost is kept, as some distances are large.
     precise: bool,
     leaves: Vec<u32>,
@@ -58,8 +58,8 @@ pub(crate) struct RadialTable {
 pub(crate) struct Cubics<'a> {
     pub(crate) groups: &'a [Group],
     pub(crate) seconds: &'a [Group],
-    /// Whether a group has second ones, 1 or 0; all are [`UNUSED`] where it has none.
-    pub(crate) ridged: &'a [u8],
+    /// A bit for each cell of a group that has a second one; the others' are [`UNUSED`].
+    pub(crate) ridged: &'a [u16],
     /// Whether the last coefficients count.
     pub(crate) precise: bool,
 }
@@ -466,7 +466,7 @@ impl RadialTable {
                 group[4][lane] = 0.0;
             }
         }
-        self.ridged[group] = 1;
+        self.ridged[group] |= 1 << lane;
     }
 
     /// The signed distance in scene units at a place in a cell without a cubic, from 0 to 1 in it, where it is to be had
@@ -1054,7 +1054,7 @@ pub(super) mod tests {
                         let cubics = table.cubics();
                         let (v, second) = (value(cubics.groups), value(cubics.seconds));
                         let has_second = second != f64::from(UNUSED);
-                        assert!(!has_second || cubics.ridged[k / GROUP] == 1);
+                        assert_eq!(has_second, cubics.ridged[k / GROUP] >> (k % GROUP) & 1 != 0);
                         ridges += u32::from(has_second);
                         all += 1;
                         let found = if v.is_nan() {

@@ -7,8 +7,7 @@
 //! A row's radii rise and fall by at most a cell from voxel to voxel, so neighbours find their coefficients among a few
 //! in registers: lanes permute instead of gathering.
 //!
-//! Cells with a ridge have two cubics, of which the one nearer to 0 counts. Blocks whose cells are in groups without any
-//! do not look for a second.
+//! Cells with a ridge have two cubics, of which the one nearer to 0 counts. Blocks without any do not look for a second.
 //!
 //! c4 is what c0 lost when it became an f32, so that the sum in brackets, at most some cells in size, is all that is
 //! rounded before the last addition.
@@ -76,7 +75,7 @@ fn plain(table: Cubics<'_>, least: f32, radii: &[u32], out: &mut [f32]) -> u8 {
         #[allow(clippy::cast_precision_loss, reason = "16 bits")]
         let t = (radii[n] & 0xffff) as f32 * (1.0 / 65_536.0);
         let mut value = plain_cubic(&table.groups[cell / GROUP], cell % GROUP, t);
-        if table.ridged[cell / GROUP] != 0 {
+        if table.ridged[cell / GROUP] >> (cell % GROUP) & 1 != 0 {
             let second = plain_cubic(&table.seconds[cell / GROUP], cell % GROUP, t);
             value = if second.abs() < value.abs() {
                 second
@@ -169,6 +168,7 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
     let (marks, _) = doubts.as_chunks_mut::<2>();
     let part = f._mm512_set1_ps(1.0 / 65_536.0);
     let low = f._mm512_set1_epi32(0xffff);
+    let one = f._mm512_set1_epi32(1);
     let limit = f._mm512_set1_ps(least);
     let all = radii
         .len()
@@ -180,7 +180,7 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
         let [p, q] = blocks[n];
         let first = p.min(q) / 16;
         let near = p.max(q) - 16 * first <= 32 - REACH;
-        let (Some((groups, seconds)), true) = (pair(table, first as usize), near) else {
+        let (Some((groups, seconds, ridged)), true) = (pair(table, first as usize), near) else {
             marks[n] = [
                 plain(table, least, &radii[..BLOCK], &mut values[..BLOCK]),
                 plain(table, least, &radii[BLOCK..], &mut values[BLOCK..]),
@@ -194,7 +194,9 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
         );
         let t = f._mm512_mul_ps(f._mm512_cvtepi32_ps(f._mm512_and_si512(radius, low)), part);
         let mut value = cubic_512::<PRECISE>(simd, groups, cell, t);
-        if let Some(seconds) = seconds {
+        let ridged = f._mm512_set1_epi32(ridged.cast_signed());
+        let ridges = f._mm512_test_epi32_mask(f._mm512_srlv_epi32(ridged, cell), one);
+        if ridges != 0 {
             let second = cubic_512::<PRECISE>(simd, seconds, cell, t);
             // 17: less, and not where one is no number.
             let nearer =
@@ -218,16 +220,15 @@ fn run_512<const PRECISE: bool>(simd: pulp::x86::V4, job: Spread<'_>) {
     }
 }
 
-/// Two groups that follow each other, and their second cubics where they have any; `None` at the end of the table.
+/// Two groups that follow each other, their second cubics, and a bit for each cell that has one; `None` at the end of
+/// the table.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn pair(table: Cubics<'_>, first: usize) -> Option<(&[Group; 2], Option<&[Group; 2]>)> {
+fn pair(table: Cubics<'_>, first: usize) -> Option<(&[Group; 2], &[Group; 2], u32)> {
     let groups = two(table.groups, first)?;
-    let seconds = match two(table.ridged, first) {
-        Some([0, 0]) | None => None,
-        Some(_) => two(table.seconds, first),
-    };
-    Some((groups, seconds))
+    let seconds = two(table.seconds, first)?;
+    let [low, high] = *two(table.ridged, first)?;
+    Some((groups, seconds, u32::from(low) | u32::from(high) << 16))
 }
 
 /// Two that follow each other; `None` at the end.
@@ -322,11 +323,12 @@ fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
     let part = f._mm256_set1_ps(1.0 / 65_536.0);
     let low = f._mm256_set1_epi32(0xffff);
     let limit = f._mm256_set1_ps(least);
+    let one = f._mm256_set1_epi32(1);
     let sign = f._mm256_set1_ps(-0.0);
     for n in 0..radii.len() {
         let (radii, values) = (&radii[n], &mut values[n]);
         let first = at.blocks[n];
-        let (Some((groups, seconds)), true) =
+        let (Some((groups, seconds, ridged)), true) =
             (pair(table, first as usize / 16), first != SCATTERED)
         else {
             doubts[n] = plain(table, least, radii, values);
@@ -343,7 +345,9 @@ fn run_256(simd: pulp::x86::V3, job: Spread<'_>) {
         let t = f._mm256_mul_ps(f._mm256_cvtepi32_ps(i._mm256_and_si256(radius, low)), part);
         let precise = table.precise;
         let mut value = cubic_256(simd, (groups, half, precise), cell, upper, t);
-        if let Some(seconds) = seconds {
+        let ridged = f._mm256_set1_epi32((ridged >> (8 * half)).cast_signed());
+        let ridges = i._mm256_and_si256(i._mm256_srlv_epi32(ridged, cell), one);
+        if i._mm256_movemask_epi8(i._mm256_cmpeq_epi32(ridges, one)) != 0 {
             let second = cubic_256(simd, (seconds, half, precise), cell, upper, t);
             let [near, far] = [second, value].map(|v| f._mm256_andnot_ps(sign, v));
             value = f._mm256_blendv_ps(value, second, f._mm256_cmp_ps::<17>(near, far));
