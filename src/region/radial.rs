@@ -179,11 +179,12 @@ impl RadialTable {
                 return;
             }
             let mut near = Feet::new(field, features, row.node(from));
-            for start in (from..to).step_by(WIDEST) {
-                let end = to.min(start + WIDEST);
+            let mut start = from;
+            while start < to {
+                let end = to.min(start + row.cells_for(near.nearest()));
                 let far = row.feet(&near, end);
                 self.span(&row, [start, end], &near, &far);
-                near = far;
+                (start, near) = (end, far);
             }
         });
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
@@ -270,7 +271,7 @@ impl RadialTable {
         let (start, chain) = (self.parts.len(), row.field.chain());
         let features = row.field.features(row.field.leaf(number));
         let feet = stretch.ends.map(|q| Feet::new(row.field, features, q));
-        let least = feet.each_ref().map(Feet::least);
+        let least = feet.each_ref().map(|f| f.nearest().size());
         // No distance changes by more than the way.
         let [from, to] = stretch.ends;
         let reach = 2.0 * (to[0] - from[0] + chain.margin());
@@ -692,11 +693,15 @@ impl Feet {
         feet
     }
 
-    /// The least distance without its sign.
-    fn least(&self) -> f64 {
-        self.all()
-            .iter()
-            .fold(f64::INFINITY, |m, f| m.min(f.size()))
+    /// The foot of the least distance.
+    fn nearest(&self) -> &Foot {
+        let mut nearest = &self.list[0];
+        for foot in &self.list[..self.count] {
+            if foot.size() < nearest.size() {
+                nearest = foot;
+            }
+        }
+        nearest
     }
 
     fn all(&self) -> &[Foot] {
@@ -718,6 +723,15 @@ impl Row<'_> {
     fn node(&self, k: usize) -> [f64; 2] {
         let r = (self.first + k as i64) as f64 * self.field.cell();
         [r, self.z]
+    }
+
+    /// The most cells for which one cubic may serve, from a foot at their beginning.
+    fn cells_for(&self, foot: &Foot) -> usize {
+        let (bend, mut cells, mut h) = (foot.local.bend.abs(), 1, self.field.cell());
+        while cells < WIDEST && smooth_error(2.0 * h, bend) <= self.tolerance {
+            (cells, h) = (2 * cells, 2.0 * h);
+        }
+        cells
     }
 
     /// The feet of node `k`, from those of another point of the leaf.

@@ -139,13 +139,22 @@ mod x86 {
         [head, head + (to.len() - head) / N * N]
     }
 
+    /// Copies what is before and after the aligned part: mostly there is nothing.
+    fn copy_ends(from: &[u8], to: &mut [u8], [head, tail]: [usize; 2]) {
+        if head > 0 {
+            to[..head].copy_from_slice(&from[..head]);
+        }
+        if tail < to.len() {
+            to[tail..].copy_from_slice(&from[tail..]);
+        }
+    }
+
     /// # Safety
     /// The machine must have AVX-512F.
     #[target_feature(enable = "avx512f")]
     pub(super) unsafe fn copy_512(from: &[u8], to: &mut [u8]) {
         let [head, tail] = aligned::<64>(to);
-        to[..head].copy_from_slice(&from[..head]);
-        to[tail..].copy_from_slice(&from[tail..]);
+        copy_ends(from, to, [head, tail]);
         let (from, to) = (&from[head..tail], &mut to[head..tail]);
         for (a, b) in from.chunks_exact(64).zip(to.chunks_exact_mut(64)) {
             // SAFETY: both are 64 bytes long, and `b` is aligned to 64 bytes: the slice starts so, and so does
@@ -194,8 +203,7 @@ mod x86 {
     #[target_feature(enable = "avx")]
     pub(super) unsafe fn copy_256(from: &[u8], to: &mut [u8]) {
         let [head, tail] = aligned::<32>(to);
-        to[..head].copy_from_slice(&from[..head]);
-        to[tail..].copy_from_slice(&from[tail..]);
+        copy_ends(from, to, [head, tail]);
         let (from, to) = (&from[head..tail], &mut to[head..tail]);
         for (a, b) in from.chunks_exact(32).zip(to.chunks_exact_mut(32)) {
             // SAFETY: both are 32 bytes long, and `b` is aligned to 32 bytes as above.

@@ -38,12 +38,19 @@ impl RowWriter {
 
     /// Writes the row as the next from the first upwards; but for the `last`, some of it is carried to the next one.
     pub(super) fn write_ahead(&mut self, stream: Option<&Stream>, layer: &mut [f32], last: bool) {
-        let (end, carried) = (LINE + self.width, self.carried[0]);
+        let (end, [carried, behind]) = (LINE + self.width, self.carried);
         let at = self.written[0] * self.width;
-        let from = &self.values[LINE - carried..end];
-        let to = &mut layer[at - carried..at + self.width];
+        // The row in the middle joins what is left of the one behind it.
+        let all = at + self.width + self.written[1] * self.width == layer.len();
+        let behind = if all { behind } else { 0 };
+        if behind > 0 {
+            self.values[end..end + LINE].copy_from_slice(&self.behind);
+        }
+        let from = &self.values[LINE - carried..end + behind];
+        let to = &mut layer[at - carried..at + self.width + behind];
         let left = put(stream, from, to, last, Left::Tail);
-        self.values.copy_within(end - left..end, LINE - left);
+        // As many always: a copy of known length is one load and one store.
+        self.values.copy_within(end - LINE..end, 0);
         self.carried[0] = left;
         self.written[0] += 1;
     }
@@ -53,11 +60,11 @@ impl RowWriter {
         let (end, carried) = (LINE + self.width, self.carried[1]);
         self.written[1] += 1;
         let at = layer.len() - self.written[1] * self.width;
-        self.values[end..end + carried].copy_from_slice(&self.behind[..carried]);
+        self.values[end..end + LINE].copy_from_slice(&self.behind);
         let from = &self.values[LINE..end + carried];
         let to = &mut layer[at..at + self.width + carried];
         let left = put(stream, from, to, last, Left::Head);
-        self.behind[..left].copy_from_slice(&from[..left]);
+        self.behind.copy_from_slice(&self.values[LINE..2 * LINE]);
         self.carried[1] = left;
     }
 }
