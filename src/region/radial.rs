@@ -22,13 +22,32 @@ use super::chain::{Chain, Local};
 use super::field::MeridianField;
 use super::field_nodes::MOST_RUNS;
 use crate::math::Kernel;
+use std::ops::{Deref, DerefMut};
 
 /// Cells whose coefficients lie together.
 pub(crate) const GROUP: usize = 16;
 
 /// The coefficients of 16 cells: those of 1, t, t² and t³ over each cell, t from 0 to 1, and last what the first of
-/// them lost in rounding.
-pub(crate) type Group = [[f32; GROUP]; 5];
+/// them lost in rounding. Each kind is a line of memory.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub(crate) struct Group([[f32; GROUP]; 5]);
+
+impl Deref for Group {
+    type Target = [[f32; GROUP]; 5];
+
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for Group {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
 
 /// Cubics over the cells of one height.
 #[derive(Debug, Clone, Default)]
@@ -101,13 +120,13 @@ const SMALL: f64 = 4_194_304.0;
 /// Value of the columns that are left out: further away than anything, and its square has a root by
 /// [`crate::math::root`].
 pub(crate) const UNUSED: f32 = 1e17;
-const NO_SECOND: Group = [
+const NO_SECOND: Group = Group([
     [UNUSED; GROUP],
     [0.0; GROUP],
     [0.0; GROUP],
     [0.0; GROUP],
     [0.0; GROUP],
-];
+]);
 /// Features that may follow each other within one cell.
 const MOST_JOINTS: usize = 4;
 /// Difference of two bends, as a share of them, below which the features that touch are parts of one circle.
@@ -143,8 +162,8 @@ impl RadialTable {
         let (columns, first) = field.columns();
         let groups = columns / GROUP + PADDING;
         // What is left of the last height is overwritten, or not read where a cell has no cubic.
-        self.groups.resize(groups, [[0.0; GROUP]; 5]);
-        self.groups[columns / GROUP..].fill([[0.0; GROUP]; 5]);
+        self.groups.resize(groups, Group::default());
+        self.groups[columns / GROUP..].fill(Group::default());
         (0..start).for_each(|k| self.settle(k, UNUSED));
         for (group, ridged) in self.seconds.iter_mut().zip(&mut self.ridged) {
             if *ridged != 0 {

@@ -12,9 +12,47 @@
 
 use super::bits;
 use crate::math::{Kernel, SimdLevel};
+use std::ops::{Deref, DerefMut};
 
 /// Values of a line of memory.
 pub(crate) const LINE: usize = 16;
+
+/// Values from the beginning of a line on: lanes that load whole lines touch one each.
+#[derive(Debug, Default)]
+pub(crate) struct Lines<T> {
+    values: Vec<T>,
+    start: usize,
+    length: usize,
+}
+
+impl<T: Copy + Default> Lines<T> {
+    /// Values of a length, of which nothing is said.
+    pub(crate) fn resize(&mut self, length: usize) {
+        if self.length != length {
+            self.values.clear();
+            self.values.resize(length + LINE, T::default());
+            let start = self.values.as_ptr().align_offset(size_of::<[f32; LINE]>());
+            self.start = start.min(LINE);
+            self.length = length;
+        }
+    }
+}
+
+impl<T> Deref for Lines<T> {
+    type Target = [T];
+
+    #[inline]
+    fn deref(&self) -> &[T] {
+        &self.values[self.start..self.start + self.length]
+    }
+}
+
+impl<T> DerefMut for Lines<T> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.values[self.start..self.start + self.length]
+    }
+}
 
 /// Stores that go past the caches, where the kernel's lanes have such. They may be seen late by other threads: not
 /// after the stream is dropped.
@@ -253,6 +291,16 @@ mod tests {
                     assert_eq!(to, twin, "{:?} {start} {length}", kernel.level());
                 }
             }
+        }
+    }
+
+    #[test]
+    fn lines_begin_with_a_line() {
+        let mut lines = Lines::<f32>::default();
+        for length in [0, 1, 40, 40, 7, 100_000] {
+            lines.resize(length);
+            assert_eq!(lines.len(), length);
+            assert_eq!(lines.as_ptr().align_offset(64), 0);
         }
     }
 

@@ -3,6 +3,7 @@
 //! Radii are kept as fixed-point numbers of cells, 16 bits before the point and 16 after: the cell, and the place in
 //! it. A grid whose voxels lie alike on both sides of the axis needs only half of them, or a quarter.
 
+use super::memory::Lines;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real};
 use rayon::prelude::*;
@@ -28,7 +29,7 @@ pub(super) const PLACES: f64 = 65_536.0;
 #[derive(Debug)]
 pub(super) struct Plane {
     /// A row of [`stored`](Self::stored) radii for each of `rows`.
-    radii: Vec<u32>,
+    radii: Lines<u32>,
     /// The least cell of each block of a row.
     blocks: Vec<u32>,
     /// Rows that are kept: the first of them all, in their order.
@@ -110,7 +111,8 @@ impl Plane {
             return None;
         }
         let width = padded / BLOCK;
-        let mut radii = vec![0; rows * padded];
+        let mut radii = Lines::default();
+        radii.resize(rows * padded);
         let mut blocks = vec![0; rows * width];
         let lines = radii
             .par_chunks_mut(padded)

@@ -7,13 +7,13 @@
 //! Stores wait in their order for the memory: as few as can be are made besides those that go there, and few at a
 //! time, so that the next row is computed meanwhile.
 
-use super::memory::{LINE, Stream};
+use super::memory::{LINE, Lines, Stream};
 
 /// The row that is being made, and what those before left.
 #[derive(Debug, Default)]
 pub(super) struct RowWriter {
     /// Room for what is carried to before the row, the row, and room for what is carried to behind it.
-    values: Vec<f32>,
+    values: Lines<f32>,
     width: usize,
     /// Rows written upwards, and downwards.
     written: [usize; 2],
@@ -25,7 +25,7 @@ pub(super) struct RowWriter {
 impl RowWriter {
     /// Begins a layer of rows of `width` voxels; lanes may write `padding` values beyond the last.
     pub(super) fn start(&mut self, width: usize, padding: usize) {
-        self.values.resize(LINE + width + padding.max(LINE), 0.0);
+        self.values.resize(LINE + width + padding.max(LINE));
         self.width = width;
         self.written = [0; 2];
         self.carried = [0; 2];
