@@ -1,16 +1,27 @@
 //! Rows of a layer whose distances are those to a swept surface and to the nearer cap of a wedge.
 
 use super::bits;
-use super::caps::{CapGroups, CapRow, GROUP, Given, SweptGroups, dispatch};
+use super::caps::{Below, CapRow, CapRun, GROUP, Given, Least, SweptRow, dispatch};
 use crate::math::Kernel;
 use std::ops::Range;
+
+/// Sign bits for every byte of eight voxels.
+static SIGNS: [[u32; 8]; 256] = {
+    let mut signs = [[0; 8]; 256];
+    let mut n = 0;
+    while n < 8 * 256 {
+        signs[n / 8][n % 8] = (((n / 8) >> (n % 8)) as u32) << 31;
+        n += 1;
+    }
+    signs
+};
 
 /// What one thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct CapScratch {
-    /// A bit for each voxel of a group that is inside.
-    inside: Vec<u16>,
-    gaps: Vec<f32>,
+    /// The sign bit of each voxel: set inside.
+    signs: Vec<u32>,
+    limits: Vec<f32>,
     wanted: Vec<bool>,
     doubts: Vec<bool>,
     edges: Vec<f32>,
@@ -34,8 +45,8 @@ impl CapScratch {
     /// Makes room for rows of `padded` voxels.
     pub(super) fn resize(&mut self, padded: usize) {
         let groups = padded / GROUP;
-        self.inside.resize(groups, 0);
-        self.gaps.resize(groups, 0.0);
+        self.signs.resize(padded, 0);
+        self.limits.resize(groups, 0.0);
         self.wanted.resize(groups, false);
         self.doubts.resize(groups, false);
         self.edges.resize(padded, 0.0);
@@ -43,8 +54,11 @@ impl CapScratch {
 
     /// Takes the sides of a row from the bits of its layer, from bit `first` on.
     pub(super) fn set_inside(&mut self, layer: &[u64], first: usize) {
-        for (g, bits) in self.inside.iter_mut().enumerate() {
-            *bits = bits::sixteen(layer, first + g * GROUP);
+        let (groups, _) = self.signs.as_chunks_mut::<GROUP>();
+        for (g, signs) in groups.iter_mut().enumerate() {
+            let [low, high] = bits::sixteen(layer, first + g * GROUP).to_le_bytes();
+            signs[..8].copy_from_slice(&SIGNS[usize::from(low)]);
+            signs[8..].copy_from_slice(&SIGNS[usize::from(high)]);
         }
     }
 
@@ -60,22 +74,25 @@ impl CapScratch {
         let given = Given {
             row: line.row,
             x: line.x,
-            inside: &self.inside,
+            signs: &self.signs,
             swept: line.swept,
-            least: line.least,
             band: line.band,
         };
         dispatch(
             kernel,
-            SweptGroups {
+            SweptRow {
                 given,
                 ends: line.ends,
-                gaps: &mut self.gaps,
-                wanted: &mut self.wanted,
+                limits: &mut self.limits,
                 out,
-                doubts: &mut self.doubts,
             },
         );
+        let wanted = Below {
+            values: out,
+            least: Least::Values(&self.limits),
+            flags: &mut self.wanted,
+        };
+        dispatch(kernel, wanted);
         let groups = self.wanted.len();
         let mut from = 0;
         while from < groups {
@@ -90,20 +107,25 @@ impl CapScratch {
             edges(lanes.clone(), found);
             dispatch(
                 kernel,
-                CapGroups {
+                CapRun {
                     given: Given {
                         x: &line.x[lanes.clone()],
-                        inside: &self.inside[from..to],
+                        signs: &self.signs[lanes.clone()],
                         swept: &line.swept[lanes.clone()],
                         ..given
                     },
                     edges: found,
                     out: &mut out[lanes],
-                    doubts: &mut self.doubts[from..to],
                 },
             );
             from = to;
         }
+        let doubts = Below {
+            values: out,
+            least: Least::Size(line.least),
+            flags: &mut self.doubts,
+        };
+        dispatch(kernel, doubts);
     }
 
     /// The first `count` voxels of the row that are in groups with doubts.

@@ -242,10 +242,10 @@ fn rounded(v: f64) -> u32 {
 }
 
 /// Runs a job with the kernel's lanes.
-pub(super) fn dispatch<J: pulp::NullaryFnOnce<Output = ()>>(kernel: Kernel, job: J) {
+pub(super) fn dispatch<J: pulp::WithSimd<Output = ()>>(kernel: Kernel, job: J) {
     match kernel.lanes() {
         Some(arch) => arch.dispatch(job),
-        None => job.call(),
+        None => job.with_simd(pulp::Scalar),
     }
 }
 
@@ -284,108 +284,111 @@ impl pulp::NullaryFnOnce for Places<'_> {
 pub(super) struct Given<'a> {
     pub(super) row: CapRow,
     pub(super) x: &'a [f64],
-    /// A bit for each voxel of a group that is inside.
-    pub(super) inside: &'a [u16],
+    /// The sign bits of the voxels: set inside.
+    pub(super) signs: &'a [u32],
     /// Distances to the swept surface, of either sign.
     pub(super) swept: &'a [f32],
-    /// Values nearer to 0 than this are doubts.
-    pub(super) least: f32,
     pub(super) band: f32,
 }
 
-/// The stored value, and whether it is a doubt.
+/// Of values of 0 and more, the stored one.
 #[inline(always)]
-fn signed(value: f32, inside: u32, least: f32, band: f32) -> (f32, u32) {
-    let doubt = u32::from(!(value >= least));
+fn signed(value: f32, sign: u32, band: f32) -> f32 {
     let value = if value > band { band } else { value };
-    (f32::from_bits(value.to_bits() | (inside << 31)), doubt)
+    f32::from_bits(value.to_bits() | sign)
 }
 
-/// Fills the groups where no cap is nearer than the swept surface, and marks the others.
+/// Flags groups with a value that is below what is asked, or no number.
+pub(super) struct Below<'a> {
+    pub(super) values: &'a [f32],
+    pub(super) least: Least<'a>,
+    pub(super) flags: &'a mut [bool],
+}
+
+/// What values must be at least.
+#[derive(Clone, Copy)]
+pub(super) enum Least<'a> {
+    /// Their sizes, this.
+    Size(f32),
+    /// Those of each group, its own.
+    Values(&'a [f32]),
+}
+
+// Lanes by hand: the compiler unrolls what makes one flag of sixteen values before it could use them.
+impl pulp::WithSimd for Below<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let (groups, _) = self.values.as_chunks::<GROUP>();
+        for (g, (group, flag)) in groups.iter().zip(self.flags).enumerate() {
+            let (lanes, _) = S::as_simd_f32s(group);
+            *flag = false;
+            for &value in lanes {
+                let (value, least) = match self.least {
+                    Least::Size(least) => (simd.abs_f32s(value), least),
+                    Least::Values(least) => (value, least[g]),
+                };
+                let met = simd.greater_than_or_equal_f32s(value, simd.splat_f32s(least));
+                *flag |= simd.first_true_m32s(simd.not_m32s(met)) < S::F32_LANES;
+            }
+        }
+    }
+}
+
+/// Fills a row as if no cap were nearer than the swept surface, and finds below which value one may be.
 ///
 /// In the wedge a cap is nearer than the swept surface inside the solid only: from outside, the nearest point of the
 /// full turn is at the point's own angle.
-pub(super) struct SweptGroups<'a> {
+pub(super) struct SweptRow<'a> {
     pub(super) given: Given<'a>,
     /// The first and the last voxel of each group along x.
     pub(super) ends: &'a [[f64; 2]],
-    /// Left as the least |s| of each group, below 0 where some voxel may not be in the wedge.
-    pub(super) gaps: &'a mut [f32],
-    /// Set for each group that a cap may be nearest to.
-    pub(super) wanted: &'a mut [bool],
+    /// Left as the value below which a cap may be nearer in a group: minus its least |s|; above all where some voxel may
+    /// not be in the wedge.
+    pub(super) limits: &'a mut [f32],
     pub(super) out: &'a mut [f32],
-    pub(super) doubts: &'a mut [bool],
 }
 
-impl pulp::NullaryFnOnce for SweptGroups<'_> {
+impl pulp::NullaryFnOnce for SweptRow<'_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         let Given {
             row,
-            inside,
+            signs,
             swept,
-            least,
             band,
             ..
         } = self.given;
-        let (swept, _) = swept.as_chunks::<GROUP>();
-        let (out, _) = self.out.as_chunks_mut::<GROUP>();
-        let groups = inside.len();
-        let (ends, gaps) = (&self.ends[..groups], &mut self.gaps[..groups]);
-        for (gap, [a, b]) in gaps.iter_mut().zip(ends) {
+        for (limit, [a, b]) in self.limits.iter_mut().zip(self.ends) {
             let [c, d] = row.across;
             let (p, q) = (a * c[0] + c[1], b * c[0] + c[1]);
             let (r, s) = (a * d[0] + d[1], b * d[0] + d[1]);
             let (low, high) = (max(min(p, q), min(r, s)), max(max(p, q), max(r, s)));
             let most = if row.sense > 0.0 { high } else { -low };
             #[allow(clippy::cast_possible_truncation, reason = "a hair more is taken off")]
-            {
-                *gap = (-most * (1.0 - 1e-6)) as f32;
-            }
+            let gap = (-most * (1.0 - 1e-6)) as f32;
+            *limit = if gap < row.guard { f32::INFINITY } else { -gap };
         }
-        // Bound to what the loops go through: an index into a list in an inner loop costs the lanes.
-        let lists = gaps.iter().zip(inside).zip(swept).zip(out);
-        let flags = self.wanted[..groups]
-            .iter_mut()
-            .zip(&mut self.doubts[..groups]);
-        for ((((gap, bits), swept), out), (wanted_here, doubts_here)) in lists.zip(flags) {
-            let (gap, bits) = (*gap, u32::from(*bits));
-            let wanted = gap < row.guard
-                || bits != 0 && {
-                    // As whole numbers, whose largest the lanes may find in any order.
-                    let bits = swept.iter().fold(0, |m, s| s.abs().to_bits().max(m));
-                    let deepest = f32::from_bits(bits);
-                    // A distance that is not a number tells nothing.
-                    !(gap >= deepest)
-                };
-            *wanted_here = wanted;
-            if wanted {
-                continue;
-            }
-            let mut doubts = 0;
-            for n in 0..GROUP {
-                let inside = (bits >> n) & 1;
-                let (value, doubt) = signed(swept[n].abs(), inside, least, band);
-                out[n] = value;
-                doubts |= doubt;
-            }
-            *doubts_here = doubts != 0;
+        // In loops over the whole row: others are unrolled before they get their lanes.
+        let lists = swept.iter().zip(signs).zip(self.out.iter_mut());
+        for ((swept, sign), out) in lists {
+            *out = signed(swept.abs(), *sign, band);
         }
     }
 }
 
-/// Fills groups where caps may be the nearest.
-pub(super) struct CapGroups<'a> {
+/// Fills a run of groups where caps may be the nearest.
+pub(super) struct CapRun<'a> {
     pub(super) given: Given<'a>,
     /// Signed distances to the section in the cap's plane; left as those to the cap.
     pub(super) edges: &'a mut [f32],
     pub(super) out: &'a mut [f32],
-    pub(super) doubts: &'a mut [bool],
 }
 
-impl pulp::NullaryFnOnce for CapGroups<'_> {
+impl pulp::NullaryFnOnce for CapRun<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -393,31 +396,22 @@ impl pulp::NullaryFnOnce for CapGroups<'_> {
         let Given {
             row,
             x,
-            inside,
+            signs,
             swept,
-            least,
             band,
         } = self.given;
-        // In loops over the whole run, or of whole groups: shorter ones are unrolled before they get their lanes.
+        // In loops over the whole run: others are unrolled before they get their lanes.
         let lanes = x.iter().zip(self.edges.iter_mut()).zip(self.out.iter_mut());
         for ((x, edge), out) in lanes {
             [*out, *edge] = cap(row, *x, *edge);
         }
-        let (swept, _) = swept.as_chunks::<GROUP>();
-        let (caps, _) = self.edges.as_chunks::<GROUP>();
-        let (out, _) = self.out.as_chunks_mut::<GROUP>();
-        let groups = swept.iter().zip(caps).zip(out);
-        let marks = inside.iter().zip(self.doubts);
-        for (((swept, caps), out), (bits, mark)) in groups.zip(marks) {
-            let bits = u32::from(*bits);
-            let mut doubts = 0;
-            for n in 0..GROUP {
-                let value = nearer(row, swept[n], [out[n], caps[n]]);
-                let (value, doubt) = signed(value, (bits >> n) & 1, least, band);
-                out[n] = value;
-                doubts |= doubt;
-            }
-            *mark = doubts != 0;
+        let lanes = swept
+            .iter()
+            .zip(&*self.edges)
+            .zip(signs)
+            .zip(self.out.iter_mut());
+        for (((swept, cap), sign), out) in lanes {
+            *out = signed(nearer(row, *swept, [*out, *cap]), *sign, band);
         }
     }
 }
