@@ -29,7 +29,7 @@ use super::caps::{CapPlane, Places, combined, dispatch};
 use super::known::Known;
 use super::layer::stored;
 use super::plane::{BLOCK, PLACES, Plane, Radii, cell_and_place};
-use super::radial::{KnownLayer, Writing};
+use super::radial::{KnownLayer, Writing, is_inside, rings};
 use super::row_writer::RowWriter;
 use super::spread::spread;
 use crate::grid::GridSpec;
@@ -168,10 +168,13 @@ impl PartialSampler {
         let (scale, tolerance) = (frame.scale(), self.tolerance);
         let kernel = writing.kernel;
         (scratch.swept).fill(kernel, &self.swept, height, scale, tolerance);
-        // The membership tells the signs.
-        scratch.swept.find_signs(&self.swept, |_| false);
+        let rings = rings(body, grid, known.k);
+        // No surface is in a cell whose sign is asked, and nothing of the section behind the axis.
+        let inside = |a: f64| a >= 0.0 && is_inside(&rings, a, 0.0).unwrap_or(false);
+        (scratch.swept).find_signs(&self.swept, inside);
         let start = self.first_used(&scratch.swept, scale);
         (scratch.edges).fill_from(start, kernel, &self.edges, height, scale, tolerance);
+        scratch.edges.find_signs(&self.edges, inside);
         self.settle(body, height, &mut scratch.edges, &mut scratch.crossed);
         let PartialScratch {
             swept,
@@ -274,7 +277,6 @@ impl PartialSampler {
         crossed.resize(columns, false);
         let cell = self.edges.cell();
         let clear = CLEAR * cell * body.frame().scale();
-        table.find_signs(&self.edges, |a| body.section_holds([a, height]));
         for (k, crossed) in crossed.iter_mut().enumerate() {
             if !table.is_open(k) {
                 continue;

@@ -246,7 +246,7 @@ impl RadialSampler {
 
 /// Whether a radius is within the solid; `None` where the ring is in question: on the surface, or near one whose radius
 /// is not well known.
-fn is_inside(rings: &[Ring], r: f64, slack: f64) -> Option<bool> {
+pub(super) fn is_inside(rings: &[Ring], r: f64, slack: f64) -> Option<bool> {
     let around = |ring: &Ring| [ring.radius[0] - slack, ring.radius[1] + slack];
     if rings.iter().map(around).any(|[a, b]| a <= r && r <= b) {
         return None;
@@ -265,7 +265,7 @@ struct Mend<'a> {
 }
 
 /// The rings of layer `k`.
-fn rings(body: &Revolved, grid: &GridSpec, k: usize) -> Vec<Ring> {
+pub(super) fn rings(body: &Revolved, grid: &GridSpec, k: usize) -> Vec<Ring> {
     let point = grid.centre(0, 0, k);
     match body.rows().layer(point) {
         LayerCuts::Radii(radii) => body.rows().rings(&radii, point),
