@@ -141,6 +141,7 @@ impl RadialTable {
             let mut near = Feet::new(field, features, row.node(from));
             let mut start = from;
             while start < to {
+                near.keep_within(row.reach(to - start));
                 let end = to.min(start + row.cells_for(near.nearest()));
                 let far = row.feet(&near, end);
                 self.span(&row, number, [start, end], [&near, &far]);
@@ -549,6 +550,53 @@ pub(super) mod tests {
                     100.0 * f64::from(signs) / f64::from(special),
                     100.0 * f64::from(ridges) / f64::from(all)
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_blunt_apex_that_is_passed_within_a_cell_counts() {
+        // Its edges fall by 1.5 degrees: ten cells above, it is nearest over half a cell, and nodes see the edges alone.
+        let fall = 2000.0 * 1.5_f64.to_radians().tan();
+        for at in [0.5, 0.3, 0.75] {
+            let apex = 2100.0 + at;
+            let corners = [
+                [apex, 0.0],
+                [apex - 2000.0, -fall],
+                [apex + 2000.0, -fall],
+                [apex, 0.0],
+            ];
+            let region = Region::new(&[vec![polyline(&corners)]], Boundary::Closed, Fill::EvenOdd);
+            let swept = swept(&region.expect("a region"));
+            let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
+            let chain = Chain::new(&swept, 2.5e-5, 1000, true).expect("few arcs");
+            let extent = Extent {
+                r: [2090.0, 2111.0],
+                z: [5.0, 20.0],
+                cell: 1.0,
+            };
+            let field = MeridianField::new(chain, extent).expect("a field");
+            let (columns, first) = field.columns();
+            for z in [7.0, 10.0, 13.0] {
+                let mut table = RadialTable::default();
+                table.fill(Kernel::default(), &field, z, 1.0, 3.5e-5);
+                for n in 0..64 * columns {
+                    let (k, t) = (n / 64, f64::from((n % 64) as u32) / 64.0);
+                    #[allow(clippy::cast_precision_loss, reason = "small counts")]
+                    let r = (first + k as i64) as f64 + t;
+                    let [a, b, c, d, lost] =
+                        std::array::from_fn(|i| f64::from(table.groups[k / GROUP][i][k % GROUP]));
+                    let found = if a.is_nan() {
+                        table.size(&field, k, t)
+                    } else {
+                        a + (lost + t * (b + t * (c + t * d)))
+                    };
+                    let truth = exact.distance([r, z], f64::INFINITY);
+                    assert!(
+                        (found - truth).abs() < 6.2e-5,
+                        "{at}, {z}: {found} for {truth} at {r}"
+                    );
+                }
             }
         }
     }

@@ -95,6 +95,19 @@ impl Feet {
         nearest
     }
 
+    /// Leaves out those that are further than the nearest by more than `reach`.
+    pub(super) fn keep_within(&mut self, reach: f64) {
+        let most = self.nearest().size() + reach;
+        let mut kept = 0;
+        for n in 0..self.count {
+            if self.list[n].size() <= most {
+                self.list[kept] = self.list[n];
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+
     fn all(&self) -> &[Foot] {
         &self.list[..self.count]
     }
@@ -114,6 +127,13 @@ impl Row<'_> {
     pub(super) fn node(&self, k: usize) -> [f64; 2] {
         let r = (self.first + k as i64) as f64 * self.field.cell();
         [r, self.z]
+    }
+
+    /// What two distances may come nearer to each other over some cells: neither changes by more than the way.
+    pub(super) fn reach(&self, cells: usize) -> f64 {
+        #[allow(clippy::cast_precision_loss, reason = "a small count")]
+        let way = cells as f64 * self.field.cell();
+        2.0 * (way + self.field.chain().margin())
     }
 
     /// The most cells for which one cubic may serve, from a foot at their beginning.
@@ -174,11 +194,15 @@ impl Row<'_> {
         }
         let bend = |p: &Option<Passage>| p.as_ref().map_or(f64::INFINITY, |p| p.bend);
         let own = bend(&own);
+        let reach = self.reach(to - from);
         for (i, (a, b)) in near.all().iter().zip(far.all()).enumerate() {
             if i == first {
                 continue;
             }
             let gap = |f: &Foot, feet: &Feet| f.size() - feet.list[first].size();
+            if gap(a, near) + gap(b, far) > reach {
+                continue;
+            }
             let passage = passage(i);
             let bent = h * (bend(&passage) + own);
             let clear = a.local.value * b.local.value > 0.0
