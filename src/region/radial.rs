@@ -569,17 +569,21 @@ pub(super) mod tests {
             let region = Region::new(&[vec![polyline(&corners)]], Boundary::Closed, Fill::EvenOdd);
             let swept = swept(&region.expect("a region"));
             let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
-            let chain = Chain::new(&swept, 2.5e-5, 1000, true).expect("few arcs");
+            // The region's unit is its own.
+            let furthest = |m: f64, b: &BoundaryPiece| m.max(b.piece.bounds.max[0]);
+            let cell = swept.iter().fold(0.0, furthest) / (apex + 2000.0);
+            let chain = Chain::new(&swept, 2.5e-5 * cell, 1000, true).expect("few arcs");
             let extent = Extent {
-                r: [2090.0, 2111.0],
-                z: [5.0, 20.0],
-                cell: 1.0,
+                r: [2090.0, 2111.0].map(|r| r * cell),
+                z: [5.0, 20.0].map(|z| z * cell),
+                cell,
             };
             let field = MeridianField::new(chain, extent).expect("a field");
             let (columns, first) = field.columns();
             for z in [7.0, 10.0, 13.0] {
                 let mut table = RadialTable::default();
-                table.fill(Kernel::default(), &field, z, 1.0, 3.5e-5);
+                table.fill(Kernel::default(), &field, z * cell, 1.0, 3.5e-5 * cell);
+                let mut tabulated = 0;
                 for n in 0..64 * columns {
                     let (k, t) = (n / 64, f64::from((n % 64) as u32) / 64.0);
                     #[allow(clippy::cast_precision_loss, reason = "small counts")]
@@ -589,14 +593,16 @@ pub(super) mod tests {
                     let found = if a.is_nan() {
                         table.size(&field, k, t)
                     } else {
+                        tabulated += 1;
                         a + (lost + t * (b + t * (c + t * d)))
                     };
-                    let truth = exact.distance([r, z], f64::INFINITY);
+                    let truth = exact.distance([r, z].map(|c| c * cell), f64::INFINITY);
                     assert!(
-                        (found - truth).abs() < 6.2e-5,
-                        "{at}, {z}: {found} for {truth} at {r}"
+                        (found - truth).abs() < 6.2e-5 * cell,
+                        "{at}, {z}: {found} for {truth} at {r}, {cell}"
                     );
                 }
+                assert!(tabulated > 16 * columns, "{at}, {z}: {tabulated}");
             }
         }
     }
