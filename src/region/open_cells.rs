@@ -217,12 +217,12 @@ impl OpenCells {
         true
     }
 
-    /// Finds the signs in cells that the surface is not in; `inside` tells them by the radius. Gives each of them to
-    /// `each`: its number, its sign, and both cubics where a ridge between two crosses it.
+    /// Finds the signs in cells that the surface is not in; `inside` tells them by the radius, where it can. Gives those
+    /// that a ridge between two cubics crosses to `each`: the cell's number, its sign, and both.
     pub(super) fn find_signs(
         &mut self,
         field: &MeridianField,
-        inside: impl Fn(f64) -> bool,
+        inside: impl Fn(f64) -> Option<bool>,
         mut each: impl FnMut(usize, f64, [[f64; 4]; 2]),
     ) {
         let reach = (CLEAR * field.cell() + field.chain().margin()) * self.scale;
@@ -232,11 +232,10 @@ impl OpenCells {
             if self.size(field, cell, 0.0) <= reach {
                 continue;
             }
-            let sign = if inside(radius(field, cell, 0.5)) {
-                -1.0
-            } else {
-                1.0
+            let Some(inside) = inside(radius(field, cell, 0.5)) else {
+                continue;
             };
+            let sign = if inside { -1.0 } else { 1.0 };
             self.cells[cell].sign = sign;
             if let [one, other] = self.parts(cell)
                 && [one.places, other.places] == [WHOLE; 2]

@@ -243,9 +243,13 @@ impl RadialTable {
         }
     }
 
-    /// Finds the signs in open cells that the surface is not in; `inside` tells them by the radius. Those with a ridge
-    /// between two cubics are open no longer.
-    pub(crate) fn find_signs(&mut self, field: &MeridianField, inside: impl Fn(f64) -> bool) {
+    /// Finds the signs in open cells that the surface is not in; `inside` tells them by the radius, where it can. Those
+    /// with a ridge between two cubics are open no longer.
+    pub(crate) fn find_signs(
+        &mut self,
+        field: &MeridianField,
+        inside: impl Fn(f64) -> Option<bool>,
+    ) {
         let Self {
             groups,
             seconds,
@@ -493,7 +497,8 @@ pub(super) mod tests {
                     let began = std::time::Instant::now();
                     table.fill(Kernel::default(), &field, z, 1.0, 3.5e-5 * cell);
                     table.find_signs(&field, |r| {
-                        region.section().side_of(r, z) != crate::math::Side::Outside
+                        let side = region.section().side_of(r, z);
+                        Some(side != crate::math::Side::Outside)
                     });
                     time += began.elapsed();
                     for k in 0..columns {

@@ -20,6 +20,7 @@
 //!   body        the way of one body
 //!   composite   bits and distances of several
 //!   rows        the rest
+//!   row_writer  rows of a layer, to the memory one at a time
 //!   memory      stores past the caches, large pages
 //! ```
 

@@ -169,8 +169,14 @@ impl PartialSampler {
         let kernel = writing.kernel;
         (scratch.swept).fill(kernel, &self.swept, height, scale, tolerance);
         let rings = rings(body, grid, known.k);
-        // No surface is in a cell whose sign is asked, and nothing of the section behind the axis.
-        let inside = |a: f64| a >= 0.0 && is_inside(&rings, a, 0.0).unwrap_or(false);
+        let inside = |a: f64| {
+            // Nothing of the section is behind the axis.
+            if a < 0.0 {
+                Some(false)
+            } else {
+                is_inside(&rings, a, 0.0)
+            }
+        };
         (scratch.swept).find_signs(&self.swept, inside);
         let start = self.first_used(&scratch.swept, scale);
         (scratch.edges).fill_from(start, kernel, &self.edges, height, scale, tolerance);

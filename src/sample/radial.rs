@@ -2,8 +2,8 @@
 //!
 //! The distance depends on the height and the radius alone. Each layer gets one table over the radii
 //! ([`RadialTable`]), which is spread to its rows. What the table does not hold to the stored precision is mended voxel
-//! by voxel: from the few features of its cell where the distance has a ridge, by the exact path where the surface is
-//! so near that the sign is in question.
+//! by voxel: from the few features of its cell where the table has it open, by the exact path where the surface is so
+//! near that the sign is in question.
 //!
 //! ```text
 //!   |stored - exact| <= arcs 2.5e-5 + cubics 3.5e-5 + radii 1.0e-5 + sums 0.3e-5 of the least spacing + 1/2 ulp
@@ -138,8 +138,7 @@ impl RadialSampler {
         scratch.close.clear();
         scratch.known.clear();
         let rings = rings(body, grid, k);
-        // No surface is in a cell whose sign is asked.
-        let inside = |r| is_inside(&rings, r, 0.0).unwrap_or(false);
+        let inside = |r| is_inside(&rings, r, 0.0);
         scratch.table.find_signs(&self.field, inside);
         let (columns, padded) = self.plane.stored();
         let blocks = padded / BLOCK;
