@@ -344,8 +344,8 @@ pub(super) struct SweptRow<'a> {
     pub(super) given: Given<'a>,
     /// The first and the last voxel of each group along x.
     pub(super) ends: &'a [[f64; 2]],
-    /// Left as the value below which a cap may be nearer in a group: minus its least |s|; above all where some voxel may
-    /// not be in the wedge.
+    /// Left as the value below which a cap may be nearer in a group: minus its least |s|; no number where some voxel may
+    /// not be in the wedge: one is nearer than any value.
     pub(super) limits: &'a mut [f32],
     pub(super) out: &'a mut [f32],
 }
@@ -370,7 +370,8 @@ impl pulp::NullaryFnOnce for SweptRow<'_> {
             let most = if row.sense > 0.0 { high } else { -low };
             #[allow(clippy::cast_possible_truncation, reason = "a hair more is taken off")]
             let gap = (-most * (1.0 - 1e-6)) as f32;
-            *limit = if gap < row.guard { f32::INFINITY } else { -gap };
+            // No value is at least what is no number.
+            *limit = if gap < row.guard { f32::NAN } else { -gap };
         }
         // In loops over the whole row: others are unrolled before they get their lanes.
         let lists = swept.iter().zip(signs).zip(self.out.iter_mut());
