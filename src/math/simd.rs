@@ -80,6 +80,14 @@ impl Kernel {
         }
     }
 
+    /// Runs a job whose loops are the same for all lanes.
+    pub(crate) fn dispatch<J: pulp::WithSimd>(self, job: J) -> J::Output {
+        match self.0 {
+            Loops::Scalar => job.with_simd(pulp::Scalar),
+            Loops::Wide(arch) => arch.dispatch(job),
+        }
+    }
+
     /// The machine's lanes, unless the plain loops were chosen.
     pub(crate) fn lanes(self) -> Option<Arch> {
         match self.0 {

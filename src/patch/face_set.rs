@@ -174,6 +174,8 @@ impl FaceSet {
     pub(crate) fn may_touch(&self, bounds: &Aabb, span: impl Fn(DVec3) -> [f64; 2]) -> bool {
         let (low, high) = (self.frame.local(bounds.min), self.frame.local(bounds.max));
         let meets = |b: &Box3, slack: f64| {
+            // The shape's own coordinates are rounded twice.
+            let slack = slack + 2.0 * f64::EPSILON;
             (0..3).all(|c| !(b.min[c] - slack > high[c] || b.max[c] + slack < low[c]))
         };
         let centre = self.frame.centre;
@@ -183,7 +185,8 @@ impl FaceSet {
             let middle = up.dot(centre + DVec3::from_array(part.origin) * self.frame.unit);
             let [from, to] = span(up).map(|height| height - middle);
             let [low, high] = part.heights.map(|h| h * self.frame.unit);
-            let slack = part.slack() * self.frame.unit + rounding;
+            // Each coordinate is off by as much, and `up` may lean towards all three.
+            let slack = up.abs().element_sum() * part.slack() * self.frame.unit + rounding;
             from > high + slack || to < low - slack
         };
         let found = std::cell::Cell::new(false);

@@ -48,10 +48,7 @@ pub(super) fn in_eights(list: &[(Shape, f64)]) -> impl Iterator<Item = Eight> {
 /// The distance from `q`, which is `away` from the centre of the eights, to the nearest of them.
 pub(super) fn nearest(kernel: Kernel, eights: &[Eight], q: [f64; 2], away: f64) -> f64 {
     let job = Nearest { eights, q, away };
-    match kernel.lanes() {
-        Some(arch) => arch.dispatch(job),
-        None => job.run(),
-    }
+    kernel.dispatch(job)
 }
 
 struct Nearest<'a> {
@@ -65,13 +62,6 @@ impl pulp::NullaryFnOnce for Nearest<'_> {
 
     #[inline(always)]
     fn call(self) -> f64 {
-        self.run()
-    }
-}
-
-impl Nearest<'_> {
-    #[inline(always)]
-    fn run(self) -> f64 {
         let mut least = f64::INFINITY;
         for eight in self.eights {
             // No feature is nearer to the point than to the centre by more than `away`.

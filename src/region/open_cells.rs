@@ -92,7 +92,7 @@ impl OpenCells {
     pub(super) fn open_by_runs<'a>(
         &mut self,
         row: &Row<'_>,
-        [cell, leaf]: [usize; 2],
+        (cell, leaf): (usize, u32),
         mut runs: impl Iterator<Item = [&'a Foot; 2]>,
     ) -> Option<[f64; 4]> {
         let start = self.parts.len();
@@ -110,7 +110,7 @@ impl OpenCells {
             self.parts.truncate(start);
             return Some(cubic);
         }
-        self.open(cell, number(leaf), start);
+        self.open(cell, leaf, start);
         None
     }
 

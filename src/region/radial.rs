@@ -213,7 +213,7 @@ impl RadialTable {
             // The distance is the least of theirs, and each is within the tolerance.
             let runs = (0..near.count).filter(|i| rivals.is_some_and(|r| r.has(*i)));
             let feet = runs.map(|i| [&near.list[i], &far.list[i]]);
-            match self.open.open_by_runs(row, [from, leaf as usize], feet) {
+            match self.open.open_by_runs(row, (from, leaf), feet) {
                 Some(cubic) => store(&mut self.groups[from / GROUP], from % GROUP, cubic),
                 None => self.leave_open(from),
             }

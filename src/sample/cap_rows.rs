@@ -1,7 +1,7 @@
 //! Rows of a layer whose distances are those to a swept surface and to the nearer cap of a wedge.
 
 use super::bits;
-use super::caps::{Below, CapRow, CapRun, GROUP, Given, Least, SweptRow, dispatch};
+use super::caps::{Below, CapRow, CapRun, GROUP, Given, Least, SweptRow};
 use crate::math::Kernel;
 use std::ops::Range;
 
@@ -78,21 +78,18 @@ impl CapScratch {
             swept: line.swept,
             band: line.band,
         };
-        dispatch(
-            kernel,
-            SweptRow {
-                given,
-                ends: line.ends,
-                limits: &mut self.limits,
-                out,
-            },
-        );
+        kernel.dispatch(SweptRow {
+            given,
+            ends: line.ends,
+            limits: &mut self.limits,
+            out,
+        });
         let wanted = Below {
             values: out,
             least: Least::Values(&self.limits),
             flags: &mut self.wanted,
         };
-        dispatch(kernel, wanted);
+        kernel.dispatch(wanted);
         let groups = self.wanted.len();
         let mut from = 0;
         while from < groups {
@@ -105,19 +102,16 @@ impl CapScratch {
             let lanes = from * GROUP..to * GROUP;
             let found = &mut self.edges[..lanes.len()];
             edges(lanes.clone(), found);
-            dispatch(
-                kernel,
-                CapRun {
-                    given: Given {
-                        x: &line.x[lanes.clone()],
-                        signs: &self.signs[lanes.clone()],
-                        swept: &line.swept[lanes.clone()],
-                        ..given
-                    },
-                    edges: found,
-                    out: &mut out[lanes],
+            kernel.dispatch(CapRun {
+                given: Given {
+                    x: &line.x[lanes.clone()],
+                    signs: &self.signs[lanes.clone()],
+                    swept: &line.swept[lanes.clone()],
+                    ..given
                 },
-            );
+                edges: found,
+                out: &mut out[lanes],
+            });
             from = to;
         }
         let doubts = Below {
@@ -125,7 +119,7 @@ impl CapScratch {
             least: Least::Size(line.least),
             flags: &mut self.doubts,
         };
-        dispatch(kernel, doubts);
+        kernel.dispatch(doubts);
     }
 
     /// The first `count` voxels of the row that are in groups with doubts.

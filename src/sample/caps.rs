@@ -18,7 +18,7 @@
 
 use super::plane::{BLOCK, PLACES, REACH, SCATTERED};
 use crate::grid::GridSpec;
-use crate::math::{Dd, Kernel, Real, root};
+use crate::math::{Dd, Real, root};
 use crate::solid::Revolved;
 
 /// Voxels that are decided on together.
@@ -238,14 +238,6 @@ fn rounded(v: f64) -> u32 {
     #[allow(clippy::cast_possible_truncation, reason = "the low half is meant")]
     {
         (v + 4_503_599_627_370_496.0).to_bits() as u32
-    }
-}
-
-/// Runs a job with the kernel's lanes.
-pub(super) fn dispatch<J: pulp::WithSimd<Output = ()>>(kernel: Kernel, job: J) {
-    match kernel.lanes() {
-        Some(arch) => arch.dispatch(job),
-        None => job.with_simd(pulp::Scalar),
     }
 }
 

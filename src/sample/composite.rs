@@ -169,10 +169,7 @@ impl Composite<'_> {
             inside: known.inside,
             out,
         };
-        match writing.kernel.lanes() {
-            Some(arch) => arch.dispatch(job),
-            None => job.run(),
-        }
+        writing.kernel.dispatch(job);
     }
 
     /// Counts which distances of a layer are exact; `sdf` is what [`distances`](Self::distances) found.
@@ -293,13 +290,6 @@ impl pulp::NullaryFnOnce for Combine<'_> {
 
     #[inline(always)]
     fn call(self) {
-        self.run();
-    }
-}
-
-impl Combine<'_> {
-    #[inline(always)]
-    fn run(self) {
         let mut largest = [0.0_f32; TOGETHER];
         for (n, out) in self.out.chunks_mut(TOGETHER).enumerate() {
             let first = n * TOGETHER;

@@ -25,7 +25,7 @@
 
 use super::bits;
 use super::cap_rows::{CapLine, CapScratch};
-use super::caps::{CapPlane, Places, combined, dispatch};
+use super::caps::{CapPlane, Places, combined};
 use super::known::Known;
 use super::layer::stored;
 use super::plane::{BLOCK, PLACES, Plane, Radii, cell_and_place};
@@ -370,16 +370,13 @@ impl PartialSampler {
             let length = lanes.len();
             let places = &mut scratch.places[..length];
             let cells = &mut scratch.cells[..length / BLOCK];
-            dispatch(
-                kernel,
-                Places {
-                    row,
-                    x: &x[lanes],
-                    scattered: self.caps.is_scattered(),
-                    places,
-                    cells,
-                },
-            );
+            kernel.dispatch(Places {
+                row,
+                x: &x[lanes],
+                scattered: self.caps.is_scattered(),
+                places,
+                cells,
+            });
             let places = Radii {
                 radii: places,
                 blocks: cells,

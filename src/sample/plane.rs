@@ -62,13 +62,6 @@ impl pulp::NullaryFnOnce for Mirror<'_> {
 
     #[inline(always)]
     fn call(self) {
-        self.run();
-    }
-}
-
-impl Mirror<'_> {
-    #[inline(always)]
-    fn run(self) {
         // In parts of fixed length, which the compiler reverses in registers.
         let (left, from) = self.left[..self.right.len()].as_chunks::<16>();
         let (to, right) = self.right.as_rchunks_mut::<16>();
@@ -180,10 +173,7 @@ impl Plane {
     pub(super) fn mirror(&self, kernel: Kernel, row: &mut [f32]) {
         let (left, right) = row.split_at_mut(self.stored);
         let job = Mirror { left, right };
-        match kernel.lanes() {
-            Some(arch) => arch.dispatch(job),
-            None => job.run(),
-        }
+        kernel.dispatch(job);
     }
 
     /// The row that mirrors row `j`.

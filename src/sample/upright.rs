@@ -207,10 +207,7 @@ impl UprightBody {
             open: &mut scratch.open,
             circle,
         };
-        match kernel.lanes() {
-            Some(arch) => arch.dispatch(job),
-            None => job.run(),
-        }
+        kernel.dispatch(job)
     }
 }
 
@@ -242,14 +239,7 @@ impl pulp::NullaryFnOnce for Ends<'_> {
 
     #[inline(always)]
     fn call(self) -> bool {
-        self.run()
-    }
-}
-
-impl Ends<'_> {
-    /// Lists of one length each, so that the compiler uses its lanes.
-    #[inline(always)]
-    fn run(self) -> bool {
+        // Lists of one length each, so that the compiler uses its lanes.
         let Circle {
             square,
             rounding,
