@@ -12,6 +12,7 @@
 
 use super::bits;
 use crate::math::{Kernel, SimdLevel};
+use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
 /// Values of a line of memory.
@@ -59,12 +60,17 @@ impl<T> DerefMut for Lines<T> {
 #[derive(Debug)]
 pub(crate) struct Stream {
     kernel: Kernel,
+    /// Only the thread that stored can wait for its stores: a stream stays with it.
+    of_thread: PhantomData<*const ()>,
 }
 
 impl Stream {
     /// A stream with the stores that `kernel` has.
     pub(crate) fn new(kernel: Kernel) -> Self {
-        Self { kernel }
+        Self {
+            kernel,
+            of_thread: PhantomData,
+        }
     }
 
     /// Copies bytes.
