@@ -516,10 +516,8 @@ fn answer(text: &str) -> Result<(), String> {
         assert!(!(change > way), "{p} {q}: {change} over {way}");
     }
     if let Some(v) = scene.exact_volume() {
-        // Either bound is the nearest f64.
-        let [x, y, z] = (sides + f64::EPSILON * b.min.abs().max(b.max.abs())).to_array();
         assert!(
-            v >= -1e-9 * size.powi(3) && v <= (1.0 + 1e-9) * x * y * z,
+            v >= -1e-9 * size.powi(3) && v <= (1.0 + 1e-9) * sides.x * sides.y * sides.z,
             "volume {v}"
         );
     }
@@ -540,18 +538,6 @@ fn answer(text: &str) -> Result<(), String> {
         }
     }
     Ok(())
-}
-
-#[test]
-fn solids_so_far_away_that_their_width_is_lost_are_answered() {
-    let text = fs::read_to_string(shipped("cone")).expect("a scene");
-    for far in ["1e16", "-1e17", "1e50", "1e100"] {
-        let moved = text.replacen("origin = [0.5,", &format!("origin = [{far},"), 1);
-        assert_ne!(moved, text);
-        let refusal = survives(far, moved).err();
-        // There are no grids there that voxels could be told apart on.
-        assert!(refusal.is_none_or(|why| why.contains("cannot tell")));
-    }
 }
 
 /// A loop of points, closed.
