@@ -829,6 +829,37 @@ fn huge_and_tiny_coordinates_are_answered() {
     built("a small scale", turn("place = [{ scale = 1e-50 }]"));
 }
 
+/// Where neighbouring f64 are further apart than the solid is wide, its bounds still hold it, and a
+/// grid is answered or refused for that.
+#[test]
+fn solids_so_far_away_that_their_width_is_lost() {
+    let moved = "place = [{ translate = [0, PLACE, 0] }]\nkind";
+    let scenes = [
+        ("cone", "origin = [0.5", "origin = [PLACE"),
+        ("ellipsoid", "[1, -2, 0.5]", "[1, PLACE, 0.5]"),
+        (
+            "torus",
+            "kind = \"revolve\"",
+            &format!("{moved} = \"revolve\""),
+        ),
+        (
+            "volume_cylinder",
+            "kind = \"volume\"",
+            &format!("{moved} = \"volume\""),
+        ),
+    ];
+    for (name, from, to) in scenes {
+        let shipped = fs::read_to_string(shipped(name)).expect("a scene");
+        assert!(shipped.contains(from), "{name}");
+        for place in ["1e6", "1e16", "-1e17", "1e50", "1e100"] {
+            let text = shipped.replace(from, &to.replace("PLACE", place));
+            if let Err(e) = survives(&format!("{name} at {place}"), text) {
+                assert!(e.contains("cannot tell"), "{name} at {place}: {e}");
+            }
+        }
+    }
+}
+
 /// Texts that a mutation puts in.
 const PIECES: &[&str] = &[
     "0",

@@ -235,16 +235,9 @@ pub(super) fn side_of(height: Dd, size: f64) -> Side {
 
 /// The box about the frame's origin that reaches `extent(k)` local lengths along world axis k.
 pub(super) fn placed_bounds(frame: &Similarity, extent: impl Fn(usize) -> Dd) -> Aabb {
-    let end = |sign: f64| {
-        DVec3::from_array(std::array::from_fn(|k| {
-            let reach = frame.scale_exact() * extent(k) * Dd::of(sign);
-            (frame.origin_exact()[k] + reach).f64()
-        }))
-    };
-    Aabb {
-        min: end(-1.0),
-        max: end(1.0),
-    }
+    Aabb::around(frame.origin_exact(), |k, sign| {
+        frame.scale_exact() * extent(k) * Dd::of(sign)
+    })
 }
 
 /// The length of a vector of any size.

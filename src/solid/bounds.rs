@@ -14,22 +14,15 @@ use crate::math::Side;
 use crate::math::bernstein::{self, Coefficients};
 use crate::math::{Aabb, Dd, Real, Similarity};
 use crate::region::BoundaryPiece;
-use glam::DVec3;
 
 pub(super) fn bounds(frame: &Similarity, turn: &Turn, boundary: &[BoundaryPiece]) -> Aabb {
-    let mut min = DVec3::ZERO;
-    let mut max = DVec3::ZERO;
     let scale = frame.scale_exact();
-    for k in 0..3 {
-        let [x, y, a] = [0, 1, 2].map(|i| frame.axis_exact(i)[k]);
-        let origin = frame.origin_exact()[k];
-        for (sign, out) in [(Dd::ONE, &mut max), (-Dd::ONE, &mut min)] {
-            let m = largest_over_turn(turn, [x * sign, y * sign]);
-            let extent = support(boundary, a * sign, m);
-            out[k] = (origin + scale * extent * sign).f64();
-        }
-    }
-    Aabb { min, max }
+    Aabb::around(frame.origin_exact(), |k, sign| {
+        let sign = Dd::of(sign);
+        let [x, y, a] = [0, 1, 2].map(|i| frame.axis_exact(i)[k] * sign);
+        let extent = support(boundary, a, largest_over_turn(turn, [x, y]));
+        scale * extent * sign
+    })
 }
 
 /// The largest of v·(cos φ, sin φ) over the turn.

@@ -174,19 +174,13 @@ impl Patches {
     }
 
     fn placed(frame: Similarity, nets: Arc<Nets>) -> Self {
-        let extent = |k: usize, sign: f64| {
+        let bounds = Aabb::around(frame.origin_exact(), |k, sign| {
             // A world direction in local coordinates.
             let direction = DVec3::from_array([0, 1, 2].map(|i| frame.axis(i)[k])) * sign;
             // Rounding takes a flat face beyond its points; where the axes agree those are exact.
             let support = nets.faces.support(direction).min(nets.hull(direction));
-            let reach = frame.scale_exact() * Dd::of(support * sign);
-            (frame.origin_exact()[k] + reach).f64()
-        };
-        let end = |sign: f64| DVec3::from_array([0, 1, 2].map(|k| extent(k, sign)));
-        let bounds = Aabb {
-            min: end(-1.0),
-            max: end(1.0),
-        };
+            frame.scale_exact() * Dd::of(support * sign)
+        });
         let turned = nets.turned.as_ref().map(|(region, turn)| {
             let frame = frame.with_local_unit(region.unit());
             let (section, boundary) = (region.section().clone(), region.boundary().to_vec());
