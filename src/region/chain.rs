@@ -481,29 +481,26 @@ impl Chain {
         (seen == list.len()).then_some(runs)
     }
 
-    /// A run in parts, without the corners that are nearest to no point of a box (its corners are given): those where
+    /// A run in parts, without the corners that are nearest to no point of a box, lowest to highest: those where
     /// every point is short of the corner by the arc before it and beyond it by the arc after it, as on the hollow
     /// side.
-    pub(crate) fn parts<'a>(&self, run: &'a [u32], corners: &[[f64; 2]; 4]) -> Vec<&'a [u32]> {
+    pub(crate) fn parts<'a>(&self, run: &'a [u32], ends: [[f64; 2]; 2]) -> Vec<&'a [u32]> {
         let hollow = |i: &u32| {
             let f = &self.features[*i as usize];
-            let side = |t: [f64; 2], q: &[f64; 2]| dot(t, minus(*q, f.arc.start));
-            f.corner != 0.0
-                && (corners.iter()).all(|q| side(f.arc.from, q) < 0.0 && side(f.arc.to, q) > 0.0)
+            let at = f.arc.start;
+            f.corner != 0.0 && most(ends, f.arc.from, at) < 0.0 && least(ends, f.arc.to, at) > 0.0
         };
         run.split(hollow).filter(|part| !part.is_empty()).collect()
     }
 
-    /// Whether every point of a box (its corners are given) has one stationary feature of a run at most, found by
-    /// walking, if the one nearest to it is in the run.
-    pub(crate) fn is_smooth(&self, run: &[u32], corners: &[[f64; 2]; 4]) -> bool {
+    /// Whether every point of a box, lowest to highest, has one stationary feature of a run at most, found by walking,
+    /// if the one nearest to it is in the run.
+    pub(crate) fn is_smooth(&self, run: &[u32], ends: [[f64; 2]; 2]) -> bool {
         let last = run.len() - 1;
         run.iter().enumerate().all(|(n, &i)| {
             let f = &self.features[i as usize];
-            let least = |t: [f64; 2], p: [f64; 2]| {
-                (corners.iter()).fold(f64::INFINITY, |m, q| m.min(dot(t, minus(*q, p))))
-            };
-            let most = |t: [f64; 2], p: [f64; 2]| -least(t.map(|c| -c), p);
+            let least = |t, p| least(ends, t, p);
+            let most = |t, p| most(ends, t, p);
             if f.before == OPEN && least(f.arc.from, f.arc.start) < 0.0
                 || f.after == OPEN && most(f.arc.to, f.arc.end) > 0.0
             {
@@ -540,6 +537,19 @@ impl Chain {
             k == 0.0 || clear(f.arc.from, f.arc.start) && clear(f.arc.to, f.arc.end)
         })
     }
+}
+
+/// The least of t · (q - p) over the points q of a box, lowest to highest.
+#[inline]
+fn least([low, high]: [[f64; 2]; 2], t: [f64; 2], p: [f64; 2]) -> f64 {
+    let along = |c: usize| (t[c] * (low[c] - p[c])).min(t[c] * (high[c] - p[c]));
+    along(0) + along(1)
+}
+
+/// The most of it.
+#[inline]
+fn most(ends: [[f64; 2]; 2], t: [f64; 2], p: [f64; 2]) -> f64 {
+    -least(ends, t.map(|c| -c), p)
 }
 
 /// The features numbered along their chains.

@@ -139,9 +139,9 @@ impl Square {
         self.low.map(|c| c + 0.5 * self.side)
     }
 
-    fn corners(self) -> [[f64; 2]; 4] {
-        let Self { low: [r, z], side } = self;
-        [[r, z], [r + side, z], [r, z + side], [r + side, z + side]]
+    /// Its lowest corner and its highest.
+    fn ends(self) -> [[f64; 2]; 2] {
+        [self.low, self.low.map(|c| c + self.side)]
     }
 
     fn quarters(self) -> [Self; 4] {
@@ -270,16 +270,16 @@ impl<'a> Builder<'a> {
             .collect();
         let limit = nearest + 2.0 * radius;
         kept.retain(|(_, d)| *d <= limit);
-        let corners = square.corners();
+        let ends = square.ends();
         let rising: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
         if let Some(runs) = self.lattice.chain.runs(&rising) {
             let parts = runs
                 .iter()
-                .flat_map(|run| self.lattice.chain.parts(run, &corners));
+                .flat_map(|run| self.lattice.chain.parts(run, ends));
             let parts: Vec<&[u32]> = parts.collect();
             if (1..=MOST_RUNS).contains(&parts.len())
                 && level <= LEVELS_OF_RUNS[parts.len() - 1]
-                && (parts.iter()).all(|part| self.lattice.chain.is_smooth(part, &corners))
+                && (parts.iter()).all(|part| self.lattice.chain.is_smooth(part, ends))
             {
                 let middles: Vec<u32> = parts.iter().map(|part| part[part.len() / 2]).collect();
                 let start = self.nodes.pool.len();

@@ -66,6 +66,8 @@ impl BlockLayer<'_> {
             let limit = (half * (1.0 + 1e-6) + self.near) as f32;
             let part = SIDES.get(n + 1).copied().unwrap_or(side);
             parts.clear();
+            // Squares side by side that are inside, as one.
+            let mut inside = [[0; 2]; 2];
             for chunk in squares.chunks(CHUNK) {
                 // The centre of the part that is in the layer: its corners are no further.
                 let centre =
@@ -83,13 +85,17 @@ impl BlockLayer<'_> {
                             parts.extend((i..to_i).step_by(part as usize).map(|i| [i, j]));
                         }
                     } else if *value < 0.0 {
-                        for row in j as usize..to_j as usize {
-                            let first = row * self.size[0];
-                            bits::flip(sides.inside, first + i as usize, first + to_i as usize);
+                        let [[_, end], rows] = inside;
+                        if [j, to_j] == rows && i == end {
+                            inside[0][1] = to_i;
+                        } else {
+                            self.flip(inside, sides);
+                            inside = [[i, to_i], [j, to_j]];
                         }
                     }
                 }
             }
+            self.flip(inside, sides);
             std::mem::swap(squares, parts);
         }
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
@@ -144,6 +150,15 @@ impl BlockLayer<'_> {
                     }
                 }
             }
+        }
+    }
+
+    /// Flips a rectangle of voxels, from and to along x and y.
+    fn flip(&self, [x, y]: [[u32; 2]; 2], sides: &mut SideBits<'_>) {
+        let [from, to] = x.map(|i| i as usize);
+        for row in y[0] as usize..y[1] as usize {
+            let first = row * self.size[0];
+            bits::flip(sides.inside, first + from, first + to);
         }
     }
 
