@@ -23,6 +23,16 @@ pub(super) struct BlockScratch {
     marks: Vec<Marks>,
 }
 
+impl BlockScratch {
+    /// Makes room for squares.
+    fn start(&mut self, squares: impl Iterator<Item = [u32; 2]>) {
+        self.squares[0].clear();
+        self.squares[0].extend(squares);
+        self.values.resize(CHUNK, 0.0);
+        self.marks.resize(CHUNK / LANES, Marks::default());
+    }
+}
+
 /// A layer of voxels with its distances.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockLayer<'a> {
@@ -45,38 +55,22 @@ impl BlockLayer<'_> {
         sides: &mut SideBits<'_>,
         mut ask: impl FnMut(usize, usize) -> Side,
     ) {
-        let [nx, ny] = self.size.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        let [nx, ny] = self.counts();
+        scratch.start(self.squares(SIDES[0]));
         let BlockScratch {
             squares: [squares, parts],
             points,
             values,
             marks,
         } = scratch;
-        squares.clear();
-        let first = SIDES[0] as usize;
-        for j in (0..ny).step_by(first) {
-            squares.extend((0..nx).step_by(first).map(|i| [i, j]));
-        }
-        values.resize(CHUNK, 0.0);
-        marks.resize(CHUNK / LANES, Marks::default());
-        let diagonal = self.spacing[0].hypot(self.spacing[1]);
         for (n, &side) in SIDES.iter().enumerate() {
-            let half = 0.5 * f64::from(side - 1) * diagonal;
-            #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
-            let limit = (half * (1.0 + 1e-6) + self.near) as f32;
+            let limit = self.limit(side, 0.0);
             let part = SIDES.get(n + 1).copied().unwrap_or(side);
             parts.clear();
             // Squares side by side that are inside, as one.
             let mut inside = [[0; 2]; 2];
             for chunk in squares.chunks(CHUNK) {
-                // The centre of the part that is in the layer: its corners are no further.
-                let centre =
-                    |at: u32, count: u32| f64::from(at) + 0.5 * f64::from(side.min(count - at) - 1);
-                for (c, (points, count)) in points.iter_mut().zip([nx, ny]).enumerate() {
-                    points.clear();
-                    points.extend(chunk.iter().map(|s| centre(s[c], count)));
-                    points.resize(chunk.len().next_multiple_of(LANES), points[0]);
-                }
+                self.centres(chunk, side, points);
                 let filled = self.look_up(kernel, limit, lanes, points, values, marks);
                 for (&[i, j], value) in chunk.iter().zip(&values[..filled]) {
                     let (to_i, to_j) = (nx.min(i + side), ny.min(j + side));
@@ -150,6 +144,71 @@ impl BlockLayer<'_> {
                     }
                 }
             }
+        }
+    }
+
+    /// For all squares of a block's width, row by row: `band` where their voxels are all at least so far from the
+    /// surface, minus that inside, and 0 where some may be nearer.
+    pub(super) fn far(
+        &self,
+        kernel: Kernel,
+        lanes: &mut Lanes,
+        scratch: &mut BlockScratch,
+        band: f32,
+        out: &mut Vec<f32>,
+    ) {
+        const SIDE: u32 = LANES as u32;
+        scratch.start(self.squares(SIDE));
+        let BlockScratch {
+            squares: [squares, _],
+            points,
+            values,
+            marks,
+        } = scratch;
+        let limit = self.limit(SIDE, f64::from(band));
+        out.clear();
+        for chunk in squares.chunks(CHUNK) {
+            self.centres(chunk, SIDE, points);
+            self.look_up(kernel, limit, lanes, points, values, marks);
+            let values = &values[..chunk.len()];
+            out.extend(values.iter().map(|value| {
+                if value.abs() >= limit {
+                    band.copysign(*value)
+                } else {
+                    0.0
+                }
+            }));
+        }
+    }
+
+    /// Voxels along x and y.
+    fn counts(&self) -> [u32; 2] {
+        self.size.map(|n| u32::try_from(n).unwrap_or(u32::MAX))
+    }
+
+    /// First voxels of all squares with sides of so many voxels, row by row.
+    fn squares(&self, side: u32) -> impl Iterator<Item = [u32; 2]> {
+        let [nx, ny] = self.counts();
+        let row = move |j| (0..nx).step_by(side as usize).map(move |i| [i, j]);
+        (0..ny).step_by(side as usize).flat_map(row)
+    }
+
+    /// The distance of a square's centre from which on all of its voxels are at least `beyond` from the surface.
+    #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
+    fn limit(&self, side: u32, beyond: f64) -> f32 {
+        let diagonal = self.spacing[0].hypot(self.spacing[1]);
+        let half = 0.5 * f64::from(side - 1) * diagonal;
+        ((half + beyond) * (1.0 + 1e-6) + self.near) as f32
+    }
+
+    /// The centres of squares, of the part of each that is in the layer: its corners are no further.
+    fn centres(&self, squares: &[[u32; 2]], side: u32, points: &mut [Vec<f64>; 2]) {
+        let centre =
+            |at: u32, count: u32| f64::from(at) + 0.5 * f64::from(side.min(count - at) - 1);
+        for (c, (points, count)) in points.iter_mut().zip(self.counts()).enumerate() {
+            points.clear();
+            points.extend(squares.iter().map(|s| centre(s[c], count)));
+            points.resize(squares.len().next_multiple_of(LANES), points[0]);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Rows of a layer whose distances are those to a swept surface and to the nearer cap of a wedge.
 
 use super::bits;
-use super::caps::{Below, CapRow, CapRun, GROUP, Given, Least, SweptRow};
+use super::caps::{BEYOND, Below, CapRow, CapRun, GROUP, Given, Least, SweptRow};
 use crate::math::Kernel;
 use std::ops::Range;
 
@@ -84,6 +84,13 @@ impl CapScratch {
             limits: &mut self.limits,
             out,
         });
+        if line.band.is_finite() {
+            for (out, limit) in out.as_chunks_mut::<GROUP>().0.iter_mut().zip(&self.limits) {
+                if *limit == BEYOND {
+                    out.fill(line.band);
+                }
+            }
+        }
         let wanted = Below {
             values: out,
             least: Least::Values(&self.limits),

@@ -328,6 +328,9 @@ impl pulp::WithSimd for Below<'_> {
     }
 }
 
+/// No value is less.
+pub(super) const BEYOND: f32 = f32::NEG_INFINITY;
+
 /// Fills a row as if no cap were nearer than the swept surface, and finds below which value one may be.
 ///
 /// In the wedge a cap is nearer than the swept surface inside the solid only: from outside, the nearest point of the
@@ -336,8 +339,9 @@ pub(super) struct SweptRow<'a> {
     pub(super) given: Given<'a>,
     /// The first and the last voxel of each group along x.
     pub(super) ends: &'a [[f64; 2]],
-    /// Left as the value below which a cap may be nearer in a group: minus its least |s|; no number where some voxel may
-    /// not be in the wedge: one is nearer than any value.
+    /// Left as the value below which a cap may be nearer in a group: minus its least |s|; [`BEYOND`] where all of it is
+    /// outside the wedge and as far from both caps as the band; no number where some voxel else may not be in the wedge:
+    /// a cap is nearer than any value.
     pub(super) limits: &'a mut [f32],
     pub(super) out: &'a mut [f32],
 }
@@ -359,11 +363,20 @@ impl pulp::NullaryFnOnce for SweptRow<'_> {
             let (p, q) = (a * c[0] + c[1], b * c[0] + c[1]);
             let (r, s) = (a * d[0] + d[1], b * d[0] + d[1]);
             let (low, high) = (max(min(p, q), min(r, s)), max(max(p, q), max(r, s)));
-            let most = if row.sense > 0.0 { high } else { -low };
+            let (most, least) = if row.sense > 0.0 {
+                (high, low)
+            } else {
+                (-low, -high)
+            };
             #[allow(clippy::cast_possible_truncation, reason = "a hair more is taken off")]
-            let gap = (-most * (1.0 - 1e-6)) as f32;
+            let [gap, beyond] = [-most, least].map(|s| (s * (1.0 - 1e-6)) as f32);
             // No value is at least what is no number.
-            *limit = if gap < row.guard { f32::NAN } else { -gap };
+            let near = if beyond - row.guard >= band {
+                BEYOND
+            } else {
+                f32::NAN
+            };
+            *limit = if gap < row.guard { near } else { -gap };
         }
         // In loops over the whole row: others are unrolled before they get their lanes.
         let lists = swept.iter().zip(signs).zip(self.out.iter_mut());

@@ -81,6 +81,8 @@ pub(super) struct TiltedScratch {
     lanes: Lanes,
     blocks: BlockScratch,
     marks: Vec<Marks>,
+    /// Of each square of a layer, the value of all its voxels where that is at the end of the band, or 0.
+    far: Vec<f32>,
     /// Rows that wait to be written together.
     writer: RowWriter,
     close: Vec<Close>,
@@ -189,21 +191,26 @@ impl TiltedSampler {
         scratch: &mut TiltedScratch,
         sides: &mut SideBits<'_>,
     ) {
-        let [nx, ny, _] = grid.dims();
-        let spacing = grid.spacing();
-        let layer = BlockLayer {
-            table: &self.table,
-            view: self.view(k),
-            size: [nx, ny],
-            spacing: [spacing.x, spacing.y],
-            near: self.near,
-        };
+        let layer = self.blocks(grid, k);
         let TiltedScratch { lanes, blocks, .. } = scratch;
         layer.fill(kernel, lanes, blocks, sides, |i, j| {
             body.side(grid.centre(i, j, k))
         });
         if *body.turn() != Turn::Full {
             Wedge::new(body, grid, k).narrow(sides);
+        }
+    }
+
+    /// Layer `k` in squares.
+    fn blocks(&self, grid: &GridSpec, k: usize) -> BlockLayer<'_> {
+        let [nx, ny, _] = grid.dims();
+        let spacing = grid.spacing();
+        BlockLayer {
+            table: &self.table,
+            view: self.view(k),
+            size: [nx, ny],
+            spacing: [spacing.x, spacing.y],
+            near: self.near,
         }
     }
 
@@ -222,18 +229,33 @@ impl TiltedSampler {
         let padded = nx.next_multiple_of(LANES);
         let TiltedScratch {
             lanes,
+            blocks,
             marks,
+            far,
             writer,
             close,
-            ..
         } = scratch;
         marks.resize(padded / LANES, Marks::default());
         writer.start(nx, LANES);
         let band = stored(writing.band);
+        let width = padded / LANES;
+        self.far(writing, (grid, k), (lanes, blocks), far);
         for j in 0..ny {
             let row = &mut writer.row()[..padded];
-            let found = (self.near(), &mut **marks);
-            self.row(writing.kernel, (view, [0, j]), lanes, found, row);
+            let mut block = 0;
+            for run in far[j / LANES * width..][..width].chunk_by(|a, b| a == b) {
+                let row = &mut row[block * LANES..][..run.len() * LANES];
+                let marks = &mut marks[block..][..run.len()];
+                if run[0] == 0.0 {
+                    let found = (self.near(), marks);
+                    let first = [block * LANES, j];
+                    self.row(writing.kernel, (view, first), lanes, found, row);
+                } else {
+                    row.fill(run[0]);
+                    marks.fill(Marks::default());
+                }
+                block += run.len();
+            }
             let row = &mut row[..nx];
             self.mend(writing.kernel, (view, j), marks, row, close);
             if writing.band.is_finite() {
@@ -244,6 +266,24 @@ impl TiltedSampler {
                 return;
             }
             writer.write_ahead(writing.stream, out, j + 1 == ny);
+        }
+    }
+
+    /// The squares of layer `k` that are all further from the full turn than the band ([`BlockLayer::far`]).
+    pub(super) fn far(
+        &self,
+        writing: Writing<'_>,
+        (grid, k): (&GridSpec, usize),
+        (lanes, blocks): (&mut Lanes, &mut BlockScratch),
+        out: &mut Vec<f32>,
+    ) {
+        let layer = self.blocks(grid, k);
+        if writing.band.is_finite() {
+            let band = stored(writing.band);
+            layer.far(writing.kernel, lanes, blocks, band, out);
+        } else {
+            out.clear();
+            out.resize(layer.size.map(|n| n.div_ceil(LANES)).iter().product(), 0.0);
         }
     }
 

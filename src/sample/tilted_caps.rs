@@ -12,6 +12,7 @@
 //! as for either table; the distance to the cap passes the second's error on by a factor of at most 1.
 
 use super::bits;
+use super::blocks::BlockScratch;
 use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapRow, GROUP, GUARD, LEAST_SINE, combined};
 use super::layer::stored;
@@ -54,7 +55,10 @@ pub(super) struct TiltedCaps {
 #[derive(Debug, Default)]
 pub(super) struct TiltedCapScratch {
     lanes: Lanes,
+    blocks: BlockScratch,
     marks: Vec<Marks>,
+    /// Squares that the swept surface is beyond the band of.
+    far: Vec<f32>,
     /// Distances of a row from the swept surface.
     distances: Vec<f32>,
     groups: CapScratch,
@@ -162,6 +166,8 @@ impl TiltedCaps {
         scratch.distances.resize(padded, 0.0);
         scratch.groups.resize(padded);
         scratch.writer.start(nx, LANES);
+        let rooms = (&mut scratch.lanes, &mut scratch.blocks);
+        swept.far(writing, (grid, known.k), rooms, &mut scratch.far);
         for j in 0..ny {
             if writing.cancel.is_some_and(|cancel| cancel()) {
                 return;
@@ -197,10 +203,13 @@ impl TiltedCaps {
         let TiltedCapScratch {
             lanes,
             marks,
+            far,
             distances,
             groups,
             writer,
+            ..
         } = scratch;
+        let far = &far[j / LANES * self.ends.len()..][..self.ends.len()];
         let k = layer.known.k;
         let nx = layer.grid.dims()[0];
         let kernel = layer.writing.kernel;
@@ -208,13 +217,23 @@ impl TiltedCaps {
         // Outside the wedge the swept surface does not matter.
         let outside = |ends: &[f64; 2]| row.is_outside(*ends);
         for run in self.ends.chunk_by(|a, b| outside(a) == outside(b)) {
-            let from = group_of(run[0][0]) * GROUP;
-            let distances = &mut distances[from..from + run.len() * GROUP];
+            let first = group_of(run[0][0]);
+            let distances = &mut distances[first * GROUP..][..run.len() * GROUP];
             if outside(&run[0]) {
                 distances.fill(f32::INFINITY);
-            } else {
-                let marks = &mut marks[..run.len()];
-                swept.swept_row(kernel, [from, j, k], lanes, marks, distances);
+                continue;
+            }
+            let mut from = 0;
+            for alike in far[first..first + run.len()].chunk_by(|a, b| a == b) {
+                let part = &mut distances[from * GROUP..][..alike.len() * GROUP];
+                if alike[0] == 0.0 {
+                    let marks = &mut marks[..alike.len()];
+                    let at = [(first + from) * GROUP, j, k];
+                    swept.swept_row(kernel, at, lanes, marks, part);
+                } else {
+                    part.fill(alike[0]);
+                }
+                from += alike.len();
             }
         }
         // Lanes beyond the last voxel see what it sees.
