@@ -21,6 +21,7 @@ use super::piece::Piece;
 use super::tree::{Box2, BoxTree};
 use crate::math::bernstein::{self, Coefficients};
 use crate::math::{Dd, Real};
+use rayon::prelude::*;
 use smallvec::SmallVec;
 
 /// A piece made ready for distances.
@@ -66,32 +67,11 @@ const PARTS: u32 = 4;
 
 impl DistanceSet {
     pub(crate) fn new<'a>(pieces: impl Iterator<Item = &'a Piece>) -> Self {
-        let mut arcs = Vec::new();
-        let mut boxes = Vec::new();
-        for piece in pieces {
-            let closed_form = piece.degree() == 1 || piece.circle.is_some();
-            let parts = if closed_form { 1 } else { PARTS };
-            let cut = |i: u32| Dd::of(f64::from(i)) / Dd::of(f64::from(parts));
-            for i in 0..parts {
-                let point = |k: u32| match k {
-                    0 => piece.start,
-                    k if k == parts => piece.end,
-                    k => piece.at(cut(k)),
-                };
-                let (start, end) = (point(i), point(i + 1));
-                if start == end {
-                    continue;
-                }
-                let part = if parts == 1 {
-                    piece.clone()
-                } else {
-                    piece.part(cut(i), cut(i + 1), start, end)
-                };
-                arcs.push(Arc::new(&part));
-                // One ulp of the unit square covers the rounding of the corners.
-                boxes.push(part.bounds.grown(f64::EPSILON));
-            }
-        }
+        let pieces: Vec<&Piece> = pieces.collect();
+        let parts = pieces.par_iter().flat_map_iter(|piece| parts(piece));
+        // One ulp of the unit square covers the rounding of the corners.
+        let arcs = parts.map(|part| (Arc::new(&part), part.bounds.grown(f64::EPSILON)));
+        let (arcs, boxes): (Vec<Arc>, Vec<Box2>) = arcs.unzip();
         let tree = BoxTree::new(&boxes);
         Self { arcs, boxes, tree }
     }
@@ -133,6 +113,29 @@ impl DistanceSet {
         });
         found.map(|i| (best.sqrt(), self.arcs[i].foot(point)))
     }
+}
+
+/// The parts of a piece that get a box each.
+fn parts(piece: &Piece) -> impl Iterator<Item = Piece> {
+    let closed_form = piece.degree() == 1 || piece.circle.is_some();
+    let parts = if closed_form { 1 } else { PARTS };
+    let cut = move |i: u32| Dd::of(f64::from(i)) / Dd::of(f64::from(parts));
+    let point = move |k: u32| match k {
+        0 => piece.start,
+        k if k == parts => piece.end,
+        k => piece.at(cut(k)),
+    };
+    (0..parts).filter_map(move |i| {
+        let (start, end) = (point(i), point(i + 1));
+        if start == end {
+            return None;
+        }
+        Some(if parts == 1 {
+            piece.clone()
+        } else {
+            piece.part(cut(i), cut(i + 1), start, end)
+        })
+    })
 }
 
 impl Arc {

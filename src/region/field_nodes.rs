@@ -101,6 +101,11 @@ impl Nodes {
 
     /// Adds what another tree consists of; the number that its root gets.
     fn append(&mut self, root: Node, other: Self) -> Node {
+        if self.quarters.is_empty() && self.leaves.is_empty() {
+            // Taken over as it is: most of a tree is not copied.
+            *self = other;
+            return root;
+        }
         let [quarters, leaves] = [self.quarters.len(), self.leaves.len()].map(number);
         let [pool, eights] = [self.pool.len(), self.eights.len()].map(number);
         let moved = |node: Node| match node {
@@ -169,7 +174,7 @@ const FEW: usize = 8;
 /// The most eights of features: some 150 MB.
 const MOST_EIGHTS: usize = 1 << 18;
 /// Levels from the root down whose quarters are made in parallel.
-const TOGETHER: u32 = 3;
+const TOGETHER: u32 = 5;
 
 /// What all parts of a tree have taken so far.
 #[derive(Debug, Default)]
