@@ -107,7 +107,7 @@ fn sampling(c: &mut Criterion) {
         let (mut occupancy, mut sdf) = (vec![1_u8; n], vec![1.0_f32; n]);
         let plain = Kernel::new(SimdLevel::Scalar).expect("always there");
         let sampler = |kernel, band| {
-            LayerSampler::new(scene.assembly(), &grid, distances(band)).with_kernel(kernel)
+            LayerSampler::with_kernel(kernel, scene.assembly(), &grid, distances(band))
         };
         sampler(plain, None).fill_occupancy(&mut occupancy);
         sampler(plain, None).fill_signed_distance(&mut sdf);

@@ -583,7 +583,7 @@ fn compare_rows(name: &str, scene: &Scene, grid: &GridSpec) -> f64 {
     let levels = [SimdLevel::Auto, SimdLevel::Avx2, SimdLevel::Scalar];
     let kernels = levels.iter().filter_map(|l| Kernel::new(*l).ok());
     let sampler =
-        |kernel| LayerSampler::new(scene.assembly(), grid, selection(None)).with_kernel(kernel);
+        |kernel| LayerSampler::with_kernel(kernel, scene.assembly(), grid, selection(None));
     let samplers: Vec<_> = kernels.map(sampler).collect();
     let [nx, ny, nz] = grid.dims();
     let spacing = grid.spacing().min_element();
@@ -691,8 +691,8 @@ fn every_way_gives_the_same_bytes() {
             for band in [None, Some(2.5 * grid.spacing().max_element())] {
                 let mut first: Option<(Vec<u8>, Vec<u32>)> = None;
                 for kernel in levels.iter().filter_map(|l| Kernel::new(*l).ok()) {
-                    let sampler = LayerSampler::new(scene.assembly(), &grid, selection(band))
-                        .with_kernel(kernel);
+                    let sampler =
+                        LayerSampler::with_kernel(kernel, scene.assembly(), &grid, selection(band));
                     let (mut occupancy, mut sdf) = (vec![7; n], vec![f32::NAN; n]);
                     sampler.fill_occupancy(&mut occupancy);
                     sampler.fill_signed_distance(&mut sdf);

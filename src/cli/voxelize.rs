@@ -380,10 +380,10 @@ fn stream(
     console: &Console,
 ) -> Result<(f64, f64, Tally), Failure> {
     let interrupted = || interrupt::check().is_err();
-    let mut sampler = LayerSampler::new(scene.assembly(), &plan.grid, plan.selection)
-        .with_kernel(plan.kernel)
-        .with_scalars(plan.scalars.clone())
-        .with_cancel(&interrupted);
+    let mut sampler =
+        LayerSampler::with_kernel(plan.kernel, scene.assembly(), &plan.grid, plan.selection)
+            .with_scalars(plan.scalars.clone())
+            .with_cancel(&interrupted);
     let per_worker = |s: &LayerSampler<'_>| plan.layer_bytes.saturating_add(s.bytes_per_thread());
     if sampler.shared_bytes().saturating_add(per_worker(&sampler)) > plan.memory_limit {
         sampler = sampler.with_exact_distances();

@@ -527,6 +527,7 @@ impl Square {
 #[cfg(test)]
 pub(in crate::region) mod tests {
     use super::*;
+    use crate::math::Kernel;
     use crate::region::radial::tests::{numbers, regions, swept};
     use crate::region::{BoundaryPiece, Chain, DistanceSet, Extent};
 
@@ -606,7 +607,7 @@ pub(in crate::region) mod tests {
                 let chain = Chain::new(&swept, arcs, 100_000, true).expect("few arcs");
                 let features = chain.len();
                 let began = std::time::Instant::now();
-                let field = MeridianField::new(chain, extent).expect("a field");
+                let field = MeridianField::new(Kernel::default(), chain, extent).expect("a field");
                 let built = began.elapsed();
                 let began = std::time::Instant::now();
                 let table = CellTable::new(&field, 1.0, cells).expect("a table");

@@ -25,37 +25,30 @@
 
 use super::arcs::{Arc, arcs, cross, dot, minus};
 use super::boundary::BoundaryPiece;
+use super::shapes::Shape;
+use super::stretches::FeatureLanes;
 use std::collections::HashMap;
 
 /// An arc, or a corner between two.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Feature {
-    arc: Arc,
+pub(super) struct Feature {
+    pub(super) arc: Arc,
     /// 0 for an arc; for a corner +1 where it is nearest to points outside, -1 inside.
-    corner: f64,
-    before: u32,
-    after: u32,
-}
-
-/// An arc, or a point whose tangents are not numbers.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
-    pub(super) start: [f64; 2],
-    pub(super) end: [f64; 2],
-    pub(super) from: [f64; 2],
-    pub(super) to: [f64; 2],
-    pub(super) curvature: f64,
+    pub(super) corner: f64,
+    pub(super) before: u32,
+    pub(super) after: u32,
 }
 
 /// Nothing follows, and points beyond are not accounted for.
-const OPEN: u32 = u32::MAX;
+pub(super) const OPEN: u32 = u32::MAX;
 /// Nothing follows, and no point of the half-plane is beyond.
-const AXIS: u32 = u32::MAX - 1;
+pub(super) const AXIS: u32 = u32::MAX - 1;
 
 /// Arcs in order, with their corners.
 #[derive(Debug, Clone)]
 pub(crate) struct Chain {
-    features: Vec<Feature>,
+    pub(super) features: Vec<Feature>,
+    pub(super) lanes: FeatureLanes,
     /// How far an arc may be from what it stands for.
     tolerance: f64,
 }
@@ -87,7 +80,7 @@ const SMOOTH: f64 = 1e-7;
 /// Joints that [`Chain::departure`] follows to either side.
 const MOST_JOINTS: usize = 16;
 /// Least share of the radius of curvature that a box keeps from the centre, on the hollow side.
-const CLEAR: f64 = 0.05;
+pub(super) const CLEAR: f64 = 0.05;
 
 impl Chain {
     /// The boundary in arcs within `tolerance`; `None` where it takes more than `most`. Without `mirrored`, points
@@ -187,8 +180,10 @@ impl Chain {
                 };
             }
         }
+        let features = in_order(&features);
         Self {
-            features: in_order(&features),
+            lanes: FeatureLanes::new(&features),
+            features,
             tolerance,
         }
     }
@@ -200,7 +195,7 @@ impl Chain {
 
     /// Bytes of what is kept.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.features)
+        size_of_val(&*self.features) + self.lanes.bytes()
     }
 
     /// Number of features.
@@ -210,15 +205,7 @@ impl Chain {
 
     /// A feature without its neighbours.
     pub(super) fn shape(&self, feature: u32) -> Shape {
-        let f = &self.features[feature as usize];
-        let tangent = |t: [f64; 2]| if f.corner == 0.0 { t } else { [f64::NAN; 2] };
-        Shape {
-            start: f.arc.start,
-            end: f.arc.end,
-            from: tangent(f.arc.from),
-            to: tangent(f.arc.to),
-            curvature: f.arc.curvature,
-        }
+        self.features[feature as usize].shape()
     }
 
     /// Unsigned distance from a point to a feature.
@@ -455,101 +442,6 @@ impl Chain {
             at
         }))
     }
-
-    /// The features of `list`, which rises, in runs that follow each other; `None` where some go round in a ring.
-    pub(crate) fn runs(&self, list: &[u32]) -> Option<Vec<Vec<u32>>> {
-        // Features are numbered in their order: what follows is the next in the list, but where a ring closes.
-        let place = |i: u32, likely: Option<usize>| {
-            let known = likely.filter(|&n| list.get(n) == Some(&i));
-            known.or_else(|| list.binary_search(&i).ok().filter(|_| i < AXIS))
-        };
-        let mut runs = Vec::new();
-        let mut seen = 0;
-        for (n, &first) in list.iter().enumerate() {
-            if place(self.features[first as usize].before, n.checked_sub(1)).is_some() {
-                continue;
-            }
-            let mut run = vec![first];
-            let mut at = n;
-            while let Some(next) = place(self.features[list[at] as usize].after, Some(at + 1)) {
-                run.push(list[next]);
-                at = next;
-            }
-            seen += run.len();
-            runs.push(run);
-        }
-        (seen == list.len()).then_some(runs)
-    }
-
-    /// A run in parts, without the corners that are nearest to no point of a box, lowest to highest: those where
-    /// every point is short of the corner by the arc before it and beyond it by the arc after it, as on the hollow
-    /// side.
-    pub(crate) fn parts<'a>(&self, run: &'a [u32], ends: [[f64; 2]; 2]) -> Vec<&'a [u32]> {
-        let hollow = |i: &u32| {
-            let f = &self.features[*i as usize];
-            let at = f.arc.start;
-            f.corner != 0.0 && most(ends, f.arc.from, at) < 0.0 && least(ends, f.arc.to, at) > 0.0
-        };
-        run.split(hollow).filter(|part| !part.is_empty()).collect()
-    }
-
-    /// Whether every point of a box, lowest to highest, has one stationary feature of a run at most, found by walking,
-    /// if the one nearest to it is in the run.
-    pub(crate) fn is_smooth(&self, run: &[u32], ends: [[f64; 2]; 2]) -> bool {
-        let last = run.len() - 1;
-        run.iter().enumerate().all(|(n, &i)| {
-            let f = &self.features[i as usize];
-            let least = |t, p| least(ends, t, p);
-            let most = |t, p| most(ends, t, p);
-            if f.before == OPEN && least(f.arc.from, f.arc.start) < 0.0
-                || f.after == OPEN && most(f.arc.to, f.arc.end) > 0.0
-            {
-                return false;
-            }
-            if f.corner != 0.0 {
-                if n == 0 || n == last {
-                    return true;
-                }
-                // No point may be short of the corner by one arc and beyond it by the other.
-                let at = f.arc.start;
-                let outward = [f.arc.from, f.arc.to];
-                // The sum of the right normals, turned to the side from which the corner is seen.
-                let fan = [
-                    outward[0][1] + outward[1][1],
-                    -outward[0][0] - outward[1][0],
-                ];
-                return least(f.arc.from, at) >= 0.0
-                    || most(f.arc.to, at) <= 0.0
-                    || least(fan.map(|c| c * f.corner), at) >= 0.0;
-            }
-            // The squared distance along the arc falls or rises all the way for every point of the box,
-            if least(f.arc.from, f.arc.start) > 0.0 && least(f.arc.to, f.arc.end) > 0.0
-                || most(f.arc.from, f.arc.start) < 0.0 && most(f.arc.to, f.arc.end) < 0.0
-            {
-                return true;
-            }
-            // or its second derivative 1 - κ n · (q - C) is positive, so that it turns from falling to rising.
-            let k = f.arc.curvature;
-            let clear = |t: [f64; 2], p: [f64; 2]| {
-                let normal = [-k * t[1], k * t[0]];
-                1.0 - most(normal, p) >= CLEAR
-            };
-            k == 0.0 || clear(f.arc.from, f.arc.start) && clear(f.arc.to, f.arc.end)
-        })
-    }
-}
-
-/// The least of t · (q - p) over the points q of a box, lowest to highest.
-#[inline]
-fn least([low, high]: [[f64; 2]; 2], t: [f64; 2], p: [f64; 2]) -> f64 {
-    let along = |c: usize| (t[c] * (low[c] - p[c])).min(t[c] * (high[c] - p[c]));
-    along(0) + along(1)
-}
-
-/// The most of it.
-#[inline]
-fn most(ends: [[f64; 2]; 2], t: [f64; 2], p: [f64; 2]) -> f64 {
-    -least(ends, t.map(|c| -c), p)
 }
 
 /// The features numbered along their chains.
@@ -577,6 +469,21 @@ fn in_order(features: &[Feature]) -> Vec<Feature> {
             ..features[i]
         })
         .collect()
+}
+
+impl Feature {
+    /// It without its neighbours.
+    pub(super) fn shape(&self) -> Shape {
+        let arc = &self.arc;
+        let tangent = |t: [f64; 2]| if self.corner == 0.0 { t } else { [f64::NAN; 2] };
+        Shape {
+            start: arc.start,
+            end: arc.end,
+            from: tangent(arc.from),
+            to: tangent(arc.to),
+            curvature: arc.curvature,
+        }
+    }
 }
 
 impl Arc {

@@ -32,7 +32,7 @@ pub(crate) const MOST_CELLS: f64 = 32_768.0;
 
 impl MeridianField {
     /// The field of a boundary over `extent`; `None` where that has too many cells or they too many features.
-    pub(crate) fn new(chain: Chain, extent: Extent) -> Option<Self> {
+    pub(crate) fn new(kernel: Kernel, chain: Chain, extent: Extent) -> Option<Self> {
         let Extent { r, z, cell } = extent;
         let first_r = (r[0] / cell).floor();
         let counts = [
@@ -59,7 +59,7 @@ impl MeridianField {
             size,
             levels: widest.next_power_of_two().ilog2(),
         };
-        let (root, nodes) = built(&lattice)?;
+        let (root, nodes) = built(kernel, &lattice)?;
         Some(Self {
             lattice,
             root,

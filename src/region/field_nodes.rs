@@ -3,7 +3,7 @@
 //! A cell keeps the features that may be nearest to one of its points: with `c` its centre and `ρ` half its
 //! diagonal, those no further from `c` than the nearest one plus 2 ρ, since no distance changes faster than the
 //! point moves. They form runs that follow each other along the boundary. A cell is a leaf when it has one run and
-//! that is smooth in it ([`Chain::is_smooth`]); or a few such, between which the distance has a ridge, and is small;
+//! that is smooth in it ([`Chain::smooth_runs`]); or a few such, between which the distance has a ridge, and is small;
 //! or when it is as small as cells become. One as small that has many features is divided a little further.
 //!
 //! The largest cells are divided in parallel; their parts are put together in the order in which one thread would have
@@ -11,7 +11,10 @@
 
 use super::chain::Chain;
 use super::eights::{Eight, in_eights};
+use super::stretches::{Near, Stretch, count, features};
+use crate::math::Kernel;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The rectangle that is divided, and what the distance is measured to.
@@ -176,6 +179,9 @@ const MOST_EIGHTS: usize = 1 << 18;
 /// Levels from the root down whose quarters are made in parallel.
 const TOGETHER: u32 = 5;
 
+/// Features after which a part of a tree says how many it has looked at.
+const OFTEN: usize = 1 << 14;
+
 /// What all parts of a tree have taken so far.
 #[derive(Debug, Default)]
 struct Work {
@@ -183,36 +189,61 @@ struct Work {
     eights: AtomicUsize,
 }
 
+impl Work {
+    fn is_too_much(&self) -> bool {
+        self.features.load(Ordering::Relaxed) > MOST_WORK
+            || self.eights.load(Ordering::Relaxed) > MOST_EIGHTS
+    }
+}
+
 /// A tree, or a part of one, while it is made.
 struct Builder<'a> {
+    kernel: Kernel,
     lattice: &'a Lattice,
     work: &'a Work,
     nodes: Nodes,
+    /// What may be nearest in a square, above what may be in the one that it is a quarter of.
+    stretches: Vec<Stretch>,
+    squares: Vec<f64>,
+    /// Features looked at that `work` does not have yet.
+    features: usize,
 }
 
 /// The tree over a lattice; `None` where it has too many cells or they too many features. Whether it has does not
 /// depend on the order of the work.
-pub(super) fn built(lattice: &Lattice) -> Option<(Node, Nodes)> {
+pub(super) fn built(kernel: Kernel, lattice: &Lattice) -> Option<(Node, Nodes)> {
     let work = Work::default();
-    let mut builder = Builder::new(lattice, &work);
-    let all: Vec<u32> = (0_u32..).take(lattice.chain.len()).collect();
-    let root = builder.node([0, 0], lattice.levels, &all);
-    let nodes = builder.nodes;
-    let fits = work.features.into_inner() <= MOST_WORK && work.eights.into_inner() <= MOST_EIGHTS;
-    fits.then_some((root, nodes))
+    let all = lattice.chain.stretches();
+    let (root, nodes) = Builder::new(kernel, lattice, &work).made([0, 0], lattice.levels, all);
+    (!work.is_too_much()).then_some((root, nodes))
 }
 
 impl<'a> Builder<'a> {
-    fn new(lattice: &'a Lattice, work: &'a Work) -> Self {
+    fn new(kernel: Kernel, lattice: &'a Lattice, work: &'a Work) -> Self {
         Self {
+            kernel,
             lattice,
             work,
             nodes: Nodes::default(),
+            stretches: Vec::new(),
+            squares: Vec::new(),
+            features: 0,
         }
     }
 
-    /// The node whose lower corner is cell `at`, 2^level cells wide, of the features in `list`.
-    fn node(&mut self, at: [u32; 2], level: u32, list: &[u32]) -> Node {
+    /// The part of a tree from a node down.
+    fn made(mut self, at: [u32; 2], level: u32, stretches: Vec<Stretch>) -> (Node, Nodes) {
+        self.stretches = stretches;
+        let all = 0..self.stretches.len();
+        let node = self.node(at, level, all);
+        self.work
+            .features
+            .fetch_add(self.features, Ordering::Relaxed);
+        (node, self.nodes)
+    }
+
+    /// The node whose lower corner is cell `at`, 2^level cells wide, of the features in a `list` of stretches.
+    fn node(&mut self, at: [u32; 2], level: u32, list: Range<usize>) -> Node {
         let lattice = self.lattice;
         if at[0] >= lattice.size[0] || at[1] >= lattice.size[1] {
             return Node::Empty;
@@ -221,21 +252,22 @@ impl<'a> Builder<'a> {
             low: lattice.corner(at),
             side: f64::from(1_u32 << level) * lattice.cell,
         };
-        let kept = match self.sorted(square, level, list) {
-            Ok(node) => return node,
-            Err(kept) => kept,
-        };
-        if level == 0 {
-            return self.fine(square, &kept, FINER);
-        }
-        let kept: Vec<u32> = kept.into_iter().map(|(i, _)| i).collect();
+        self.leaf_or(square, level, list, |builder, kept| match level {
+            0 => builder.fine(square, kept, FINER),
+            _ => builder.divided(at, level, kept),
+        })
+    }
+
+    /// The node of a square that is divided, of the features in a list of stretches.
+    fn divided(&mut self, at: [u32; 2], level: u32, list: Range<usize>) -> Node {
         let half = 1 << (level - 1);
         let corner = |q: u32| [at[0] + (q & 1) * half, at[1] + (q >> 1) * half];
-        let quarters = if level + TOGETHER > lattice.levels {
+        let quarters = if level + TOGETHER > self.lattice.levels {
+            let (kernel, lattice, work) = (self.kernel, self.lattice, self.work);
+            let list = &self.stretches[list];
             let parts = (0..4_u32).into_par_iter().map(|q| {
-                let mut part = Self::new(lattice, self.work);
-                let node = part.node(corner(q), level - 1, &kept);
-                (node, part.nodes)
+                let part = Self::new(kernel, lattice, work);
+                part.made(corner(q), level - 1, list.to_vec())
             });
             let parts: Vec<_> = parts.collect();
             let mut nodes = parts
@@ -243,78 +275,78 @@ impl<'a> Builder<'a> {
                 .map(|(node, part)| self.nodes.append(node, part));
             std::array::from_fn(|_| nodes.next().unwrap_or(Node::Empty))
         } else {
-            [0, 1, 2, 3].map(|q| self.node(corner(q), level - 1, &kept))
+            [0, 1, 2, 3].map(|q| self.node(corner(q), level - 1, list.clone()))
         };
         self.nodes.quarters.push(quarters);
         Node::Quarters(number(self.nodes.quarters.len() - 1))
     }
 
-    /// The leaf of a square in which the distance is smooth, or has few ridges; else the features that may be nearest
-    /// in it, with their distances from its centre.
-    fn sorted(
+    /// The leaf of a square in which the distance is smooth, or has few ridges; else what is made of the stretches that
+    /// may be nearest in it.
+    fn leaf_or(
         &mut self,
         square: Square,
         level: u32,
-        list: &[u32],
-    ) -> Result<Node, Vec<(u32, f64)>> {
-        let before = self.work.features.fetch_add(list.len(), Ordering::Relaxed);
-        if before + list.len() > MOST_WORK || self.work.eights.load(Ordering::Relaxed) > MOST_EIGHTS
-        {
-            return Ok(Node::Empty);
+        list: Range<usize>,
+        other: impl FnOnce(&mut Self, Range<usize>) -> Node,
+    ) -> Node {
+        if self.is_too_much(&list) {
+            return Node::Empty;
         }
-        let (side, centre) = (square.side, square.centre());
+        let (kernel, chain) = (self.kernel, &self.lattice.chain);
+        let centre = square.centre();
         // A hair more covers the rounding of the distances.
-        let radius = side * (0.5_f64.sqrt() * (1.0 + 1e-9)) + 1e-14;
-        let mut nearest = f64::INFINITY;
-        let mut kept: Vec<(u32, f64)> = (list.iter())
-            .map(|&i| {
-                let d = self.lattice.chain.distance(i, centre);
-                nearest = nearest.min(d);
-                (i, d)
-            })
-            .collect();
-        let limit = nearest + 2.0 * radius;
-        kept.retain(|(_, d)| *d <= limit);
-        let ends = square.ends();
-        let rising: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
-        if let Some(runs) = self.lattice.chain.runs(&rising) {
-            let parts = runs
-                .iter()
-                .flat_map(|run| self.lattice.chain.parts(run, ends));
-            let parts: Vec<&[u32]> = parts.collect();
-            if (1..=MOST_RUNS).contains(&parts.len())
-                && level <= LEVELS_OF_RUNS[parts.len() - 1]
-                && (parts.iter()).all(|part| self.lattice.chain.is_smooth(part, ends))
-            {
-                let middles: Vec<u32> = parts.iter().map(|part| part[part.len() / 2]).collect();
-                let start = self.nodes.pool.len();
-                self.nodes.pool.extend(middles);
-                return Ok(self.add_leaf(Kind::Smooth, [start, self.nodes.pool.len()], centre));
-            }
+        let radius = square.side * (0.5_f64.sqrt() * (1.0 + 1e-9)) + 1e-14;
+        let from = self.stretches.len();
+        let near = Near {
+            kernel,
+            centre,
+            more: 2.0 * radius,
+        };
+        chain.near(near, &mut self.stretches, list, &mut self.squares);
+        let kept = from..self.stretches.len();
+        let most = LEVELS_OF_RUNS.iter().filter(|l| level <= **l).count();
+        let runs = chain.smooth_runs(kernel, &self.stretches[kept.clone()], square.ends(), most);
+        let node = if let Some(runs) = runs {
+            let start = self.nodes.pool.len();
+            self.nodes.pool.extend(runs);
+            self.add_leaf(Kind::Smooth, [start, self.nodes.pool.len()], centre)
+        } else {
+            other(self, kept)
+        };
+        self.stretches.truncate(from);
+        node
+    }
+
+    /// Whether all parts of the tree take more than is allowed, that list too.
+    fn is_too_much(&mut self, list: &Range<usize>) -> bool {
+        self.features += count(&self.stretches[list.clone()]);
+        if self.features > OFTEN {
+            let features = std::mem::take(&mut self.features);
+            self.work.features.fetch_add(features, Ordering::Relaxed);
         }
-        Err(kept)
+        self.work.is_too_much()
     }
 
     /// The leaf of a smallest cell, or of a part of one, in which the distance is not smooth: divided `deeper` times
     /// more where it has many features.
-    fn fine(&mut self, square: Square, kept: &[(u32, f64)], deeper: u32) -> Node {
+    fn fine(&mut self, square: Square, list: Range<usize>, deeper: u32) -> Node {
         let centre = square.centre();
-        if deeper > 0 && kept.len() > FEW {
-            let list: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
+        if deeper > 0 && count(&self.stretches[list.clone()]) > FEW {
             let quarters = square.quarters().map(|part| {
-                (self.sorted(part, 0, &list))
-                    .unwrap_or_else(|kept| self.fine(part, &kept, deeper - 1))
+                self.leaf_or(part, 0, list.clone(), |builder, kept| {
+                    builder.fine(part, kept, deeper - 1)
+                })
             });
             let start = self.nodes.quarters.len();
             self.nodes.quarters.push(quarters);
             return self.add_leaf(Kind::Divided, [start, start + 1], centre);
         }
-        let mut sorted = kept.to_vec();
-        sorted.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-        let shapes = sorted
-            .iter()
-            .map(|(i, d)| (self.lattice.chain.shape(*i), *d));
-        let shapes: Vec<_> = shapes.collect();
+        let chain = &self.lattice.chain;
+        let shapes =
+            features(&self.stretches[list]).map(|i| (chain.shape(i), chain.distance(i, centre)));
+        let mut shapes: Vec<_> = shapes.collect();
+        shapes.sort_by(|a, b| a.1.total_cmp(&b.1));
         let start = self.nodes.eights.len();
         self.nodes.eights.extend(in_eights(&shapes));
         let end = self.nodes.eights.len();

@@ -32,6 +32,9 @@ mod profile;
 mod radial;
 mod radial_feet;
 mod section;
+mod shapes;
+mod stretch_lanes;
+mod stretches;
 mod tree;
 mod weld;
 

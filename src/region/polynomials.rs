@@ -529,6 +529,7 @@ fn orthonormal(rows: &mut [[f64; TERMS]]) -> Option<[[f64; TERMS]; TERMS]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Kernel;
     use crate::region::cells::tests::extent_of;
     use crate::region::radial::tests::{numbers, regions, swept};
     use crate::region::{Chain, DistanceSet, MeridianField};
@@ -559,7 +560,7 @@ mod tests {
                 let extent = extent_of(&swept, voxels);
                 let step = extent.cell;
                 let chain = Chain::new(&swept, 1.5e-5 * step, 100_000, true).expect("few arcs");
-                let field = MeridianField::new(chain, extent).expect("a field");
+                let field = MeridianField::new(Kernel::default(), chain, extent).expect("a field");
                 let table = CellTable::new(&field, 1.0, 4.5e-5 * step).expect("a table");
                 let found = PolynomialTable::new(&table, reach, 5e-5);
                 let base = table.corner()[0] / step;

@@ -484,7 +484,7 @@ pub(super) mod tests {
                     z: [low - 0.1 * side, top + 0.1 * side],
                     cell,
                 };
-                let field = MeridianField::new(chain, extent).expect("a field");
+                let field = MeridianField::new(Kernel::default(), chain, extent).expect("a field");
                 let built = began.elapsed();
                 let mut table = RadialTable::default();
                 let mut number = numbers(7);
@@ -583,7 +583,7 @@ pub(super) mod tests {
                 z: [5.0, 20.0].map(|z| z * cell),
                 cell,
             };
-            let field = MeridianField::new(chain, extent).expect("a field");
+            let field = MeridianField::new(Kernel::default(), chain, extent).expect("a field");
             let (columns, first) = field.columns();
             for z in [7.0, 10.0, 13.0] {
                 let mut table = RadialTable::default();
@@ -627,7 +627,7 @@ pub(super) mod tests {
             z: [-20.0, 20.0],
             cell: 0.01,
         };
-        assert!(MeridianField::new(chain, extent).is_none());
+        assert!(MeridianField::new(Kernel::default(), chain, extent).is_none());
     }
 
     #[test]

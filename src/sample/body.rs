@@ -79,18 +79,20 @@ pub(super) struct Asked<'a> {
 
 impl BodySampler {
     /// The sampler of a body, with its distances where they are wanted.
-    pub(super) fn new(body: &Arc<Body>, grid: &GridSpec, distances: bool) -> Self {
+    pub(super) fn new(kernel: Kernel, body: &Arc<Body>, grid: &GridSpec, distances: bool) -> Self {
         let way = body.revolved().map_or(Way::Rows, |revolved| {
             let wanted = Some(revolved).filter(|_| distances);
             match UprightBody::new(revolved, grid) {
                 Some(sides) => Way::Upright {
                     sides,
-                    distances: wanted.and_then(|body| UprightDistances::new(body, grid)),
+                    distances: wanted.and_then(|body| UprightDistances::new(kernel, body, grid)),
                 },
                 None if revolved.rows().is_upright() => Way::Rows,
-                None => TiltedSampler::new(revolved, grid).map_or(Way::Rows, |sides| Way::Tilted {
-                    sides,
-                    distances: TiltedDistances::new(wanted, grid),
+                None => TiltedSampler::new(kernel, revolved, grid).map_or(Way::Rows, |sides| {
+                    Way::Tilted {
+                        sides,
+                        distances: TiltedDistances::new(kernel, wanted, grid),
+                    }
                 }),
             }
         });
@@ -229,18 +231,18 @@ impl BodySampler {
 }
 
 impl TiltedDistances {
-    fn new(wanted: Option<&Revolved>, grid: &GridSpec) -> Self {
+    fn new(kernel: Kernel, wanted: Option<&Revolved>, grid: &GridSpec) -> Self {
         match wanted {
             Some(body) if *body.turn() == Turn::Full => Self::Full,
-            Some(body) => TiltedCaps::new(body, grid).map_or(Self::None, Self::Partial),
+            Some(body) => TiltedCaps::new(kernel, body, grid).map_or(Self::None, Self::Partial),
             None => Self::None,
         }
     }
 }
 
 impl UprightDistances {
-    fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
-        let partial = || PartialSampler::new(body, grid).map(Self::Partial);
-        (RadialSampler::new(body, grid).map(Self::Full)).or_else(partial)
+    fn new(kernel: Kernel, body: &Revolved, grid: &GridSpec) -> Option<Self> {
+        let partial = || PartialSampler::new(kernel, body, grid).map(Self::Partial);
+        (RadialSampler::new(kernel, body, grid).map(Self::Full)).or_else(partial)
     }
 }

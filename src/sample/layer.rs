@@ -142,6 +142,17 @@ impl<'a> LayerSampler<'a> {
     /// A sampler of `assembly` on `grid`.
     #[must_use]
     pub fn new(assembly: &'a Assembly, grid: &'a GridSpec, selection: Selection) -> Self {
+        Self::with_kernel(Kernel::default(), assembly, grid, selection)
+    }
+
+    /// A sampler whose inner loops, those that prepare it too, are those of `kernel`; the values do not depend on it.
+    #[must_use]
+    pub fn with_kernel(
+        kernel: Kernel,
+        assembly: &'a Assembly,
+        grid: &'a GridSpec,
+        selection: Selection,
+    ) -> Self {
         let fractions = selection
             .fraction
             .then(|| FractionSampler::new(assembly, grid.spacing()));
@@ -153,7 +164,7 @@ impl<'a> LayerSampler<'a> {
             (assembly.bodies().to_vec(), Vec::new())
         };
         let bodies = assembly.bodies().par_iter();
-        let bodies = bodies.map(|b| BodySampler::new(b, grid, selection.sdf));
+        let bodies = bodies.map(|b| BodySampler::new(kernel, b, grid, selection.sdf));
         Self {
             cancel: None,
             assembly,
@@ -163,16 +174,10 @@ impl<'a> LayerSampler<'a> {
             surfaces,
             layered,
             scalars: Vec::new(),
-            kernel: Kernel::default(),
+            kernel,
             bodies: bodies.collect(),
             single: assembly.single_index(),
         }
-    }
-
-    /// A sampler whose inner loops are those of `kernel`; the values do not depend on it.
-    #[must_use]
-    pub fn with_kernel(self, kernel: Kernel) -> Self {
-        Self { kernel, ..self }
     }
 
     /// A sampler that asks the exact path for every distance: slower, and within one ulp of it.

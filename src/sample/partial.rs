@@ -33,7 +33,7 @@ use super::radial::{KnownLayer, Writing, is_inside, rings};
 use super::row_writer::RowWriter;
 use super::spread::spread;
 use crate::grid::GridSpec;
-use crate::math::{Dd, Real};
+use crate::math::{Dd, Kernel, Real};
 use crate::region::{BoundaryPiece, Chain, Extent, MeridianField, RadialTable};
 use crate::solid::{Revolved, signed};
 
@@ -104,7 +104,7 @@ struct Layer<'a> {
 
 impl PartialSampler {
     /// The sampler of a body; `None` where it is not upright or fully turned, or its numbers leave the tables no room.
-    pub(super) fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
+    pub(super) fn new(kernel: Kernel, body: &Revolved, grid: &GridSpec) -> Option<Self> {
         if !body.rows().is_upright() {
             return None;
         }
@@ -125,7 +125,7 @@ impl PartialSampler {
         let field = |pieces: &[BoundaryPiece], r: [f64; 2], mirrored: bool| {
             let chain = Chain::new(pieces, ARCS * least, MOST_ARCS, mirrored)?;
             let z = [a.min(b), a.max(b)];
-            MeridianField::new(chain, Extent { r, z, cell })
+            MeridianField::new(kernel, chain, Extent { r, z, cell })
         };
         let pieces = body.boundary().iter().filter(|b| !b.piece.on_axis);
         let pieces: Vec<_> = pieces.cloned().collect();

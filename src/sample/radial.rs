@@ -80,7 +80,7 @@ pub(super) struct Writing<'a> {
 impl RadialSampler {
     /// The sampler of a body; `None` where its distance is not one of height and radius alone, or its numbers leave
     /// the tables no room.
-    pub(super) fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
+    pub(super) fn new(kernel: Kernel, body: &Revolved, grid: &GridSpec) -> Option<Self> {
         if !body.rows().is_upright() || *body.turn() != Turn::Full {
             return None;
         }
@@ -111,7 +111,7 @@ impl RadialSampler {
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]
         let near = (NEAR * spacing.min_element()) as f32;
         Some(Self {
-            field: MeridianField::new(chain, extent)?,
+            field: MeridianField::new(kernel, chain, extent)?,
             plane,
             tolerance: CUBICS * least,
             near,

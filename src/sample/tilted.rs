@@ -98,7 +98,7 @@ struct Close {
 
 impl TiltedSampler {
     /// The sampler of a body, or of its full turn; `None` where its numbers leave the table no room.
-    pub(super) fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
+    pub(super) fn new(kernel: Kernel, body: &Revolved, grid: &GridSpec) -> Option<Self> {
         let frame = body.frame();
         let (scale, spacing) = (frame.scale(), grid.spacing());
         let least = spacing.min_element();
@@ -121,7 +121,7 @@ impl TiltedSampler {
             .cloned()
             .collect();
         let chain = Chain::new(&swept, ARCS * least / scale, MOST_ARCS, true)?;
-        let field = MeridianField::new(chain, extent)?;
+        let field = MeridianField::new(kernel, chain, extent)?;
         let table = CellTable::new(&field, scale, CELLS * least / scale)?;
         // The frame turned so that rows run along x and z only.
         let [a, b, _] = along[0];
@@ -479,7 +479,8 @@ mod tests {
             let scene = Scene::parse(text).expect("a scene");
             let body = scene.assembly().single().and_then(Body::revolved);
             let grid = GridSpec::new([40, 30, 20], DVec3::splat(at), DVec3::splat(spacing));
-            TiltedSampler::new(body.expect("a turned body"), &grid.expect("a grid")).is_some()
+            let (body, grid) = (body.expect("a turned body"), grid.expect("a grid"));
+            TiltedSampler::new(Kernel::default(), body, &grid).is_some()
         };
         for direction in ["[1, 0, 0]", "[0, 1, 0]", "[0.3, -0.5, 0.8]"] {
             assert!(sampler(&text(direction, ""), -1.5, 0.08));

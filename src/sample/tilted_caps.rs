@@ -76,7 +76,7 @@ struct Layer<'a> {
 
 impl TiltedCaps {
     /// The caps of a body; `None` where it is fully turned, or all but fully, or its numbers leave the table no room.
-    pub(super) fn new(body: &Revolved, grid: &GridSpec) -> Option<Self> {
+    pub(super) fn new(kernel: Kernel, body: &Revolved, grid: &GridSpec) -> Option<Self> {
         let wedge = body.turn().halves()?;
         let (sin, cos) = (wedge.sin, wedge.cos);
         if cos < 0.0 && sin < LEAST_SINE {
@@ -110,7 +110,7 @@ impl TiltedCaps {
             return None;
         }
         let chain = Chain::new(body.boundary(), ARCS * least / scale, MOST_ARCS, false)?;
-        let field = MeridianField::new(chain, extent)?;
+        let field = MeridianField::new(kernel, chain, extent)?;
         let table = CellTable::new(&field, scale, CELLS * least / scale)?;
         let per = table.places();
         let corner = table.corner();

@@ -49,9 +49,14 @@ impl Job<'_> {
                 };
                 self.step.apply(scene.model_mut().0)?;
                 let grid = scene.grid()?;
-                let sampler =
-                    LayerSampler::new(scene.assembly(), &grid, selection(true, false, None));
-                black_box(sampler.with_kernel(self.kernel));
+                let selection = selection(true, false, None);
+                let assembly = scene.assembly();
+                black_box(LayerSampler::with_kernel(
+                    self.kernel,
+                    assembly,
+                    &grid,
+                    selection,
+                ));
                 Ok(())
             });
             done.map(|()| took)

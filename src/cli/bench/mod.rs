@@ -138,8 +138,7 @@ impl Job<'_> {
     }
 
     fn sampler(&self, selection: Selection) -> LayerSampler<'_> {
-        LayerSampler::new(self.scene.assembly(), &self.grid, selection)
-            .with_kernel(self.kernel)
+        LayerSampler::with_kernel(self.kernel, self.scene.assembly(), &self.grid, selection)
             .with_cancel(&interrupted)
     }
 
