@@ -261,3 +261,202 @@ fn least([low, high]: [[f64; 2]; 2], t: [f64; 2], p: [f64; 2]) -> f64 {
 fn most(ends: [[f64; 2]; 2], t: [f64; 2], p: [f64; 2]) -> f64 {
     -least(ends, t.map(|c| -c), p)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::chain::CLEAR;
+    use super::*;
+    use crate::math::{SimdLevel, every_kernel};
+    use crate::region::arcs::Arc;
+    use crate::region::radial::tests::{numbers, regions, swept};
+
+    /// Chains with and without mirrored ends, rings, corners, and some that are left open.
+    fn chains() -> Vec<(String, Chain)> {
+        let mut chains = Vec::new();
+        for (name, region) in regions() {
+            let swept = swept(&region);
+            let whole = region.boundary();
+            for (kind, pieces, mirrored) in [
+                ("mirrored", &*swept, true),
+                ("open", &swept, false),
+                ("section", whole, false),
+                ("part", &swept[..swept.len().div_ceil(2)], true),
+            ] {
+                let chain = Chain::new(pieces, 1e-6, 100_000, mirrored).expect("few arcs");
+                chains.push((format!("{name} {kind}"), chain));
+            }
+        }
+        chains
+    }
+
+    /// Squares about the chain, large ones and small ones, some with a feature's end as a corner.
+    fn squares(chain: &Chain, count: usize) -> Vec<[[f64; 2]; 2]> {
+        let mut number = numbers(11);
+        let place = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
+        let square = |i: usize| {
+            let at = chain.features[place(number(), chain.len())].arc.start;
+            let side = 0.5_f64.powf(12.0 * number());
+            let off = |x: f64| {
+                if i.is_multiple_of(4) {
+                    0.0
+                } else {
+                    2.0 * side * (x - 0.75)
+                }
+            };
+            let low = at.map(|c| c + off(number()));
+            [low, low.map(|c| c + side)]
+        };
+        (0..count).map(square).collect()
+    }
+
+    fn centre([low, high]: [[f64; 2]; 2]) -> [f64; 2] {
+        [0, 1].map(|c| low[c].midpoint(high[c]))
+    }
+
+    /// What is kept of the chain in a square, whose half diagonal is the radius.
+    fn kept(chain: &Chain, kernel: Kernel, square: [[f64; 2]; 2]) -> Vec<Stretch> {
+        let mut stretches = chain.stretches();
+        let all = stretches.len();
+        let near = Near {
+            kernel,
+            centre: centre(square),
+            more: 2.0_f64.sqrt() * (square[1][0] - square[0][0]),
+        };
+        chain.near(near, &mut stretches, 0..all, &mut Vec::new());
+        stretches.split_off(all)
+    }
+
+    #[test]
+    fn stretches_hold_what_is_near_whatever_the_lanes() {
+        for (name, chain) in chains() {
+            let all: Vec<u32> = features(&chain.stretches()).collect();
+            assert!(
+                all.iter().copied().eq((0_u32..).take(chain.len())),
+                "{name}"
+            );
+            for square in squares(&chain, 200) {
+                let centre = centre(square);
+                let more = 2.0_f64.sqrt() * (square[1][0] - square[0][0]);
+                let distances: Vec<f64> = all.iter().map(|i| chain.distance(*i, centre)).collect();
+                let limit = distances.iter().copied().fold(f64::INFINITY, f64::min) + more;
+                let plain = kept(
+                    &chain,
+                    Kernel::new(SimdLevel::Scalar).expect("plain"),
+                    square,
+                );
+                let held: Vec<u32> = features(&plain).collect();
+                assert!(held.windows(2).all(|w| w[0] < w[1]), "{name}: {held:?}");
+                for (&i, &d) in all.iter().zip(&distances) {
+                    // The distances are rounded, and so are the squares.
+                    if (d - limit).abs() > 1e-13 {
+                        assert_eq!(
+                            held.binary_search(&i).is_ok(),
+                            d < limit,
+                            "{name}: {i}, {d}, {limit}"
+                        );
+                    }
+                }
+                for kernel in every_kernel() {
+                    assert_eq!(kept(&chain, kernel, square), plain, "{name}: {kernel:?}");
+                }
+            }
+        }
+    }
+
+    /// Whether features that follow each other form one smooth run, feature by feature.
+    fn is_smooth(chain: &Chain, run: &[u32], ends: [[f64; 2]; 2]) -> bool {
+        run.iter().enumerate().all(|(n, &i)| {
+            let f = &chain.features[i as usize];
+            let Arc {
+                start,
+                end,
+                from,
+                to,
+                curvature,
+            } = f.arc;
+            if f.is_left_open(ends) {
+                return false;
+            }
+            if f.corner != 0.0 {
+                return n == 0 || n + 1 == run.len() || f.is_passed(ends);
+            }
+            let clear = |t: [f64; 2], p| {
+                1.0 - most(ends, [-curvature * t[1], curvature * t[0]], p) >= CLEAR
+            };
+            least(ends, from, start) > 0.0 && least(ends, to, end) > 0.0
+                || most(ends, from, start) < 0.0 && most(ends, to, end) < 0.0
+                || curvature == 0.0
+                || clear(from, start) && clear(to, end)
+        })
+    }
+
+    /// The runs that a list of features forms, by following each from its first; `None` where one is a ring.
+    fn runs(chain: &Chain, list: &[u32]) -> Option<Vec<Vec<u32>>> {
+        let has = |i: u32| list.contains(&i);
+        let mut runs = Vec::new();
+        for &first in list
+            .iter()
+            .filter(|i| !has(chain.features[**i as usize].before))
+        {
+            let follow = |i: &u32| Some(chain.features[*i as usize].after).filter(|n| has(*n));
+            runs.push(std::iter::successors(Some(first), follow).collect::<Vec<_>>());
+        }
+        let all: usize = runs.iter().map(Vec::len).sum();
+        (all == list.len()).then_some(runs)
+    }
+
+    #[test]
+    fn runs_are_those_found_feature_by_feature() {
+        let mut found = [0; 3];
+        for (name, chain) in chains() {
+            for square in squares(&chain, 800) {
+                let stretches = kept(&chain, Kernel::default(), square);
+                let list: Vec<u32> = features(&stretches).collect();
+                let hollow = |i: &u32| chain.features[*i as usize].is_hollow(square);
+                let runs = runs(&chain, &list);
+                let parts: Option<Vec<&[u32]>> = runs.as_ref().map(|runs| {
+                    let parts = runs.iter().flat_map(|run| run.split(hollow));
+                    parts.filter(|part| !part.is_empty()).collect()
+                });
+                for most in [1, 4] {
+                    let few = parts.clone().filter(|p| (1..=most).contains(&p.len()));
+                    let smooth = few.filter(|p| p.iter().all(|p| is_smooth(&chain, p, square)));
+                    let middles = smooth.map(|p| p.iter().map(|p| p[p.len() / 2]).collect());
+                    for kernel in every_kernel() {
+                        let given = chain.smooth_runs(kernel, &stretches, square, most);
+                        assert_eq!(given, middles, "{name}: {square:?} {list:?}");
+                    }
+                    found[middles
+                        .as_ref()
+                        .map_or(0, |m: &SmallVec<[u32; 4]>| m.len().min(2))] += 1;
+                }
+            }
+        }
+        eprintln!("none, one, more: {found:?}");
+        assert!(found.iter().all(|n| *n > 1000), "{found:?}");
+    }
+
+    #[test]
+    fn walking_the_smooth_runs_of_a_square_finds_the_nearest_feature() {
+        let mut number = numbers(5);
+        for (name, chain) in chains() {
+            for square in squares(&chain, 400) {
+                let stretches = kept(&chain, Kernel::default(), square);
+                let Some(runs) = chain.smooth_runs(Kernel::default(), &stretches, square, 4) else {
+                    continue;
+                };
+                for _ in 0..10 {
+                    let q = [0, 1].map(|c| square[0][c] + number() * (square[1][c] - square[0][c]));
+                    let walked = runs.iter().map(|i| chain.distance(chain.walk(*i, q), q));
+                    let walked = walked.fold(f64::INFINITY, f64::min);
+                    let all = (0_u32..).take(chain.len()).map(|i| chain.distance(i, q));
+                    let nearest = all.fold(f64::INFINITY, f64::min);
+                    assert!(
+                        (walked - nearest).abs() < 1e-12,
+                        "{name}: {q:?}, {walked}, {nearest}"
+                    );
+                }
+            }
+        }
+    }
+}
