@@ -56,6 +56,16 @@ kind = 'revolve'
 profile = 'star'
 ",
     ),
+    // Its own mirror image but for a ten-thousandth.
+    (
+        "almost_mirrored",
+        "[profiles.p]
+curves = [{ kind = 'polyline', points = [[1, -1], [2, -1], [2.2, -0.5], [2.2001, 0.5], [2, 1], [1, 1], [1, -1]] }]
+[[solid]]
+kind = 'revolve'
+profile = 'p'
+",
+    ),
     // A tip that meets the axis along it.
     (
         "spike",
@@ -341,6 +351,25 @@ profile = 'step'
         let origin = DVec3::new(centred(dims[0]), centred(dims[1]), -0.5 - 0.5 * side);
         let grid = GridSpec::new(dims, origin, DVec3::splat(side)).expect("a grid");
         compare("step", &scene, &grid);
+    }
+}
+
+#[test]
+fn layers_that_mirror_each_other_are_within_the_bound() {
+    for (name, text) in SCENES {
+        let scene = scene(text);
+        let b = scene.bounds();
+        let extent = 1.1 * (b.max - b.min);
+        for nz in [1, 2, 10, 11] {
+            let dims = [31, 30, nz];
+            let spacing = extent / DVec3::from_array(dims.map(|d| d as f64));
+            let middle = 0.5 * (b.min + b.max);
+            for up in [0.0, 0.01, 0.5] {
+                let origin = middle - 0.5 * extent + DVec3::Z * up * spacing;
+                let grid = GridSpec::new(dims, origin, spacing).expect("a grid");
+                compare(name, &scene, &grid);
+            }
+        }
     }
 }
 

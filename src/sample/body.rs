@@ -10,7 +10,7 @@
 use super::bits::SideBits;
 use super::layer::Cancel;
 use super::partial::{PartialSampler, PartialScratch};
-use super::radial::{KnownLayer, RadialSampler, RadialScratch, Writing};
+use super::radial::{KnownLayer, LayerOut, RadialSampler, RadialScratch, Writing};
 use super::tilted::{TiltedSampler, TiltedScratch};
 use super::tilted_caps::{TiltedCapScratch, TiltedCaps};
 use super::upright::{UprightBody, UprightScratch};
@@ -208,7 +208,11 @@ impl BodySampler {
         match &self.way {
             Way::Upright { distances, .. } => match distances {
                 Some(UprightDistances::Full(one)) => {
-                    one.layer(body, grid, known.k, writing, &mut scratch.radial, out);
+                    let out = LayerOut {
+                        k: known.k,
+                        values: out,
+                    };
+                    one.layers(body, grid, writing, &mut scratch.radial, &mut [out]);
                 }
                 Some(UprightDistances::Partial(one)) => {
                     one.layer(body, grid, known, writing, &mut scratch.partial, out);
@@ -226,6 +230,37 @@ impl BodySampler {
                 TiltedDistances::None => {}
             },
             Way::Rows => {}
+        }
+    }
+}
+
+impl BodySampler {
+    /// The layer that mirrors layer `k`, where both can be filled at once.
+    pub(super) fn twin(&self, k: usize) -> Option<usize> {
+        self.mirroring().and_then(|(one, _)| one.twin(k))
+    }
+
+    /// Fills a layer and its [`twin`](Self::twin) with signed distances.
+    pub(super) fn twin_distances(
+        &self,
+        grid: &GridSpec,
+        writing: Writing<'_>,
+        scratch: &mut BodyScratch,
+        mut layers: [LayerOut<'_>; 2],
+    ) {
+        if let Some((one, body)) = self.mirroring() {
+            one.layers(body, grid, writing, &mut scratch.radial, &mut layers);
+        }
+    }
+
+    /// What fills layers that may mirror each other.
+    fn mirroring(&self) -> Option<(&RadialSampler, &Revolved)> {
+        match &self.way {
+            Way::Upright {
+                distances: Some(UprightDistances::Full(one)),
+                ..
+            } => Some((one, self.body.revolved()?)),
+            _ => None,
         }
     }
 }

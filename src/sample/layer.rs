@@ -5,7 +5,7 @@ use super::body::{Asked, BodySampler, BodyScratch};
 use super::composite::{Composite, CompositeScratch, Limits};
 use super::fraction::FractionSampler;
 use super::memory::Stream;
-use super::radial::{KnownLayer, Writing};
+use super::radial::{KnownLayer, LayerOut, Writing};
 use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
 use crate::math::Kernel;
@@ -295,12 +295,7 @@ impl<'a> LayerSampler<'a> {
         out: &mut [f32],
         stream: Option<&Stream>,
     ) {
-        let writing = Writing {
-            kernel: self.kernel,
-            cancel: self.cancel,
-            band: self.band(),
-            stream,
-        };
+        let writing = self.writing(stream);
         let LayerScratch {
             inside,
             body,
@@ -311,6 +306,15 @@ impl<'a> LayerSampler<'a> {
             self.bodies[single].distances(self.grid, known, writing, body, out);
         } else {
             self.composite().distances(known, writing, composite, out);
+        }
+    }
+
+    fn writing<'w>(&'w self, stream: Option<&'w Stream>) -> Writing<'w> {
+        Writing {
+            kernel: self.kernel,
+            cancel: self.cancel,
+            band: self.band(),
+            stream,
         }
     }
 
@@ -395,13 +399,28 @@ impl<'a> LayerSampler<'a> {
         out.copy_from_slice(&with.scratch.inside);
     }
 
-    /// Fills one layer of distances in a large buffer.
-    pub(super) fn distance_into(&self, k: usize, with: &mut Filler, out: &mut [f32]) {
+    /// The layer that [`distance_into`](Self::distance_into) fills at once with layer `k`.
+    pub(super) fn twin(&self, k: usize) -> Option<usize> {
+        self.single.and_then(|single| self.bodies[single].twin(k))
+    }
+
+    /// Fills a layer of distances in a large buffer, or one and its [`twin`](Self::twin).
+    pub(super) fn distance_into(
+        &self,
+        with: &mut Filler,
+        layer: LayerOut<'_>,
+        twin: Option<LayerOut<'_>>,
+    ) {
+        let Filler { scratch, stream } = with;
         let single = self.single.map(|single| &self.bodies[single]);
-        if single.is_none_or(BodySampler::distances_need_sides) {
-            self.find_sides(k, &mut with.scratch);
+        if let (Some(single), Some(twin)) = (single, twin) {
+            let writing = self.writing(Some(stream));
+            return single.twin_distances(self.grid, writing, &mut scratch.body, [layer, twin]);
         }
-        self.find_distances(k, &mut with.scratch, out, Some(&with.stream));
+        if single.is_none_or(BodySampler::distances_need_sides) {
+            self.find_sides(layer.k, scratch);
+        }
+        self.find_distances(layer.k, scratch, layer.values, Some(stream));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::layer::{LayerBuffers, LayerSampler, Selection};
 use super::memory::advise_large_pages;
+use super::radial::LayerOut;
 use crate::grid::{BitVolume, GridSpec, Volume};
 use crate::scene::Scene;
 use crate::solid::Assembly;
@@ -91,12 +92,19 @@ impl LayerSampler<'_> {
             self.layers_into(out, |b| &b.sdf);
             return;
         }
-        let layers = out.par_chunks_mut(self.grid().layer_len()).enumerate();
-        layers.for_each_init(
+        let layers = out.chunks_mut(self.grid().layer_len()).enumerate();
+        let mut layers: Vec<_> = (layers.map(|(k, values)| Some(LayerOut { k, values }))).collect();
+        // Each layer with the one that mirrors it, if one does.
+        let pairs: Vec<_> = (0..layers.len())
+            .filter_map(|k| {
+                let layer = layers[k].take()?;
+                let twin = self.twin(k).and_then(|twin| layers[twin].take());
+                Some((layer, twin))
+            })
+            .collect();
+        pairs.into_par_iter().for_each_init(
             || self.filler(),
-            |with, (k, layer)| {
-                self.distance_into(k, with, layer);
-            },
+            |with, (layer, twin)| self.distance_into(with, layer, twin),
         );
     }
 
