@@ -10,13 +10,16 @@
 //!   formula/SCENE             sqrt((sqrt(x² + y²) - R)² + z²) - r for each voxel, its row's centres at hand
 //!   fill/TYPE                 what writing takes: the same buffers, the same threads
 //!   fresh/SCENE               sdf into a new volume: the tables, the pages' first touch, the distances
+//!   wavy/PIECES/prepare       from the text of a scene of as many cubic pieces to a sampler with its tables
+//!   wavy/PIECES/sdf           its whole grid, f32
+//!   wavy/PIECES/fill          the same buffer filled
 //!   fresh_touch               a new volume of one value: large pages, touched by all threads
 //!   fresh_vec                 what a new list of as many numbers takes, one thread touching its pages
 //! ```
 //!
 //! Grids of 512 voxels along the longest side; `off_centre` is the goblet with its axis beside the middle of the grid,
-//! so that no row mirrors another. The formula is that of the torus, on each scene's grid. Every answer is compared with the plain loops bit for bit, and at some
-//! voxels with the exact path, before it is timed.
+//! so that no row mirrors another. The formula is that of the torus, on each scene's grid. Every answer is compared with the
+//! plain loops bit for bit, and at some voxels with the exact path, before it is timed.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rayon::prelude::*;
@@ -30,7 +33,15 @@ use voxlathe::sample::{
 };
 
 const SIDE: u32 = 512;
-const SCENES: [&str; 6] = ["torus", "goblet", "off_centre", "cone", "vase", "flange"];
+const SCENES: [&str; 7] = [
+    "torus",
+    "cylinder",
+    "goblet",
+    "off_centre",
+    "cone",
+    "vase",
+    "flange",
+];
 
 fn kernels() -> Vec<(&'static str, Kernel)> {
     [
@@ -189,5 +200,59 @@ fn sampling(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, sampling);
+/// A scene of one wavy profile, open towards the axis, of that many cubic pieces; the waves are the same for any number.
+fn wavy(pieces: u32) -> String {
+    let point = |i: u32| {
+        let t = f64::from(i) * 50.0 / f64::from(pieces);
+        let r = 3.0 + (0.9 * t).sin() + 0.5 * (0.13 * t).cos();
+        format!("[{r}, {}]", 0.2 * t)
+    };
+    let points: Vec<_> = (0..pieces + 3).map(point).collect();
+    format!(
+        "schema = 1\n[profiles.wavy]\nboundary = 'to-axis'\n\
+         curves = [{{ kind = 'nurbs', degree = 3, points = [{}] }}]\n\
+         [[solid]]\nkind = 'revolve'\nprofile = 'wavy'\n[grid]\nresolution = {SIDE}\n",
+        points.join(", ")
+    )
+}
+
+fn many_pieces(c: &mut Criterion) {
+    for pieces in [50, 260] {
+        let text = wavy(pieces);
+        let load = || {
+            let scene = Scene::parse(&text).expect("a scene");
+            let grid = scene.grid().expect("a grid");
+            (scene, grid)
+        };
+        let (scene, grid) = load();
+        let sampler =
+            |kernel| LayerSampler::with_kernel(kernel, scene.assembly(), &grid, distances(None));
+        let n = usize::try_from(grid.voxel_count()).expect("small");
+        let (mut occupancy, mut sdf, mut plain) = (vec![1_u8; n], vec![1.0_f32; n], vec![1.0; n]);
+        let widest = sampler(Kernel::default());
+        widest.fill_occupancy(&mut occupancy);
+        widest.fill_signed_distance(&mut sdf);
+        let level = Kernel::new(SimdLevel::Scalar).expect("always there");
+        sampler(level).fill_signed_distance(&mut plain);
+        assert!(sdf == plain, "lanes differ");
+        drop(plain);
+        check(&scene, &grid, &occupancy, &sdf);
+
+        let mut group = c.benchmark_group(format!("wavy/{pieces}"));
+        group.sample_size(20);
+        group.measurement_time(Duration::from_secs(2));
+        group.bench_function("prepare", |b| {
+            b.iter(|| {
+                let (scene, grid) = load();
+                black_box(LayerSampler::new(scene.assembly(), &grid, distances(None)));
+            });
+        });
+        group.throughput(Throughput::Elements(n as u64));
+        group.bench_function("sdf", |b| b.iter(|| widest.fill_signed_distance(&mut sdf)));
+        group.bench_function("fill", |b| b.iter(|| filled(&mut sdf, black_box(2.0))));
+        group.finish();
+    }
+}
+
+criterion_group!(benches, sampling, many_pieces);
 criterion_main!(benches);
