@@ -36,19 +36,6 @@ pub(crate) fn get(words: &[u64], at: usize) -> bool {
     words[at / 64] >> (at % 64) & 1 != 0
 }
 
-/// The bits of sixteen voxels, the first the lowest; 0 beyond the last word.
-#[inline]
-pub(crate) fn sixteen(words: &[u64], at: usize) -> u16 {
-    let (word, shift) = (at / 64, at % 64);
-    let mut found = words[word] >> shift;
-    if shift > 48
-        && let Some(next) = words.get(word + 1)
-    {
-        found |= next << (64 - shift);
-    }
-    (found & 0xffff) as u16
-}
-
 /// Sets the bit of one voxel.
 #[inline]
 pub(crate) fn set(words: &mut [u64], at: usize, value: bool) {
@@ -193,13 +180,6 @@ mod tests {
                 flip(&mut words, 10, 20);
                 set(&mut words, 77, true);
                 set(&mut words, 78, false);
-                for at in 0..bits {
-                    let found = sixteen(&words, at);
-                    for n in 0..16 {
-                        let wanted = at + n < 64 * words.len() && get(&words, at + n);
-                        assert_eq!(found >> n & 1 != 0, wanted, "{n} from {at}");
-                    }
-                }
                 let mut bytes = vec![9; bits];
                 expand(kernel, &words, &mut bytes);
                 for (at, byte) in bytes.iter().enumerate() {

@@ -10,7 +10,7 @@
 use super::bits::SideBits;
 use super::layer::Cancel;
 use super::partial::{PartialSampler, PartialScratch};
-use super::radial::{KnownLayer, LayerOut, RadialSampler, RadialScratch, Writing};
+use super::radial::{LayerOut, RadialSampler, RadialScratch, Writing};
 use super::tilted::{TiltedSampler, TiltedScratch};
 use super::tilted_caps::{TiltedCapScratch, TiltedCaps};
 use super::upright::{UprightBody, UprightScratch};
@@ -121,17 +121,6 @@ impl BodySampler {
         }
     }
 
-    /// Whether [`distances`](Self::distances) rests on the layer's sides.
-    pub(super) fn distances_need_sides(&self) -> bool {
-        match &self.way {
-            Way::Upright { distances, .. } => {
-                matches!(distances, Some(UprightDistances::Partial(_)))
-            }
-            Way::Tilted { distances, .. } => matches!(distances, TiltedDistances::Partial(_)),
-            Way::Rows => false,
-        }
-    }
-
     /// Bytes that all threads share.
     pub(super) fn bytes(&self) -> u64 {
         match &self.way {
@@ -193,11 +182,11 @@ impl BodySampler {
         }
     }
 
-    /// Fills a layer with signed distances, where [`has_distances`](Self::has_distances) says so.
+    /// Fills layer `k` with signed distances, where [`has_distances`](Self::has_distances) says so.
     pub(super) fn distances(
         &self,
         grid: &GridSpec,
-        known: KnownLayer<'_>,
+        k: usize,
         writing: Writing<'_>,
         scratch: &mut BodyScratch,
         out: &mut [f32],
@@ -208,24 +197,21 @@ impl BodySampler {
         match &self.way {
             Way::Upright { distances, .. } => match distances {
                 Some(UprightDistances::Full(one)) => {
-                    let out = LayerOut {
-                        k: known.k,
-                        values: out,
-                    };
+                    let out = LayerOut { k, values: out };
                     one.layers(body, grid, writing, &mut scratch.radial, &mut [out]);
                 }
                 Some(UprightDistances::Partial(one)) => {
-                    one.layer(body, grid, known, writing, &mut scratch.partial, out);
+                    one.layer(body, grid, k, writing, &mut scratch.partial, out);
                 }
                 None => {}
             },
             Way::Tilted { sides, distances } => match distances {
                 TiltedDistances::Full => {
-                    sides.layer(body, grid, known.k, writing, &mut scratch.tilted, out);
+                    sides.layer(body, grid, k, writing, &mut scratch.tilted, out);
                 }
                 TiltedDistances::Partial(caps) => {
                     let scratch = &mut scratch.tilted_caps;
-                    caps.layer(sides, (body, grid), known, writing, scratch, out);
+                    caps.layer(sides, (body, grid), k, writing, scratch, out);
                 }
                 TiltedDistances::None => {}
             },

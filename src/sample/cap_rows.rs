@@ -1,26 +1,12 @@
 //! Rows of a layer whose distances are those to a swept surface and to the nearer cap of a wedge.
 
-use super::bits;
 use super::caps::{BEYOND, Below, CapRow, CapRun, GROUP, Given, Least, SweptRow};
 use crate::math::Kernel;
 use std::ops::Range;
 
-/// Sign bits for every byte of eight voxels.
-static SIGNS: [[u32; 8]; 256] = {
-    let mut signs = [[0; 8]; 256];
-    let mut n = 0;
-    while n < 8 * 256 {
-        signs[n / 8][n % 8] = (((n / 8) >> (n % 8)) as u32) << 31;
-        n += 1;
-    }
-    signs
-};
-
 /// What one thread reuses.
 #[derive(Debug, Default)]
 pub(super) struct CapScratch {
-    /// The sign bit of each voxel: set inside.
-    signs: Vec<u32>,
     limits: Vec<f32>,
     wanted: Vec<bool>,
     doubts: Vec<bool>,
@@ -34,7 +20,7 @@ pub(super) struct CapLine<'a> {
     pub(super) x: &'a [f64],
     /// The first and the last of each group of them.
     pub(super) ends: &'a [[f64; 2]],
-    /// Distances to the swept surface, of either sign.
+    /// Signed distances to the swept surface of the full turn.
     pub(super) swept: &'a [f32],
     /// Values nearer to 0 than this are doubts.
     pub(super) least: f32,
@@ -45,21 +31,10 @@ impl CapScratch {
     /// Makes room for rows of `padded` voxels.
     pub(super) fn resize(&mut self, padded: usize) {
         let groups = padded / GROUP;
-        self.signs.resize(padded, 0);
         self.limits.resize(groups, 0.0);
         self.wanted.resize(groups, false);
         self.doubts.resize(groups, false);
         self.edges.resize(padded, 0.0);
-    }
-
-    /// Takes the sides of a row from the bits of its layer, from bit `first` on.
-    pub(super) fn set_inside(&mut self, layer: &[u64], first: usize) {
-        let (groups, _) = self.signs.as_chunks_mut::<GROUP>();
-        for (g, signs) in groups.iter_mut().enumerate() {
-            let [low, high] = bits::sixteen(layer, first + g * GROUP).to_le_bytes();
-            signs[..8].copy_from_slice(&SIGNS[usize::from(low)]);
-            signs[8..].copy_from_slice(&SIGNS[usize::from(high)]);
-        }
     }
 
     /// Fills a row but for its [doubts](Self::doubtful); `edges` gives the signed distances to the section in the
@@ -74,7 +49,6 @@ impl CapScratch {
         let given = Given {
             row: line.row,
             x: line.x,
-            signs: &self.signs,
             swept: line.swept,
             band: line.band,
         };
@@ -112,7 +86,6 @@ impl CapScratch {
             kernel.dispatch(CapRun {
                 given: Given {
                     x: &line.x[lanes.clone()],
-                    signs: &self.signs[lanes.clone()],
                     swept: &line.swept[lanes.clone()],
                     ..given
                 },

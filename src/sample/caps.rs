@@ -276,18 +276,16 @@ impl pulp::NullaryFnOnce for Places<'_> {
 pub(super) struct Given<'a> {
     pub(super) row: CapRow,
     pub(super) x: &'a [f64],
-    /// The sign bits of the voxels: set inside.
-    pub(super) signs: &'a [u32],
-    /// Distances to the swept surface, of either sign.
+    /// Signed distances to the swept surface of the full turn.
     pub(super) swept: &'a [f32],
     pub(super) band: f32,
 }
 
-/// Of values of 0 and more, the stored one.
+/// A value that is no further from 0 than the band.
 #[inline(always)]
-fn signed(value: f32, sign: u32, band: f32) -> f32 {
-    let value = if value > band { band } else { value };
-    f32::from_bits(value.to_bits() | sign)
+fn clamped(value: f32, band: f32) -> f32 {
+    let least = if value < -band { -band } else { value };
+    if least > band { band } else { least }
 }
 
 /// Flags groups with a value that is below what is asked, or no number.
@@ -352,11 +350,7 @@ impl pulp::NullaryFnOnce for SweptRow<'_> {
     #[inline(always)]
     fn call(self) {
         let Given {
-            row,
-            signs,
-            swept,
-            band,
-            ..
+            row, swept, band, ..
         } = self.given;
         for (limit, [a, b]) in self.limits.iter_mut().zip(self.ends) {
             let [c, d] = row.across;
@@ -379,9 +373,8 @@ impl pulp::NullaryFnOnce for SweptRow<'_> {
             *limit = if gap < row.guard { near } else { -gap };
         }
         // In loops over the whole row: others are unrolled before they get their lanes.
-        let lists = swept.iter().zip(signs).zip(self.out.iter_mut());
-        for ((swept, sign), out) in lists {
-            *out = signed(swept.abs(), *sign, band);
+        for (swept, out) in swept.iter().zip(self.out.iter_mut()) {
+            *out = clamped(*swept, band);
         }
     }
 }
@@ -402,7 +395,6 @@ impl pulp::NullaryFnOnce for CapRun<'_> {
         let Given {
             row,
             x,
-            signs,
             swept,
             band,
         } = self.given;
@@ -411,13 +403,9 @@ impl pulp::NullaryFnOnce for CapRun<'_> {
         for ((x, edge), out) in lanes {
             [*out, *edge] = cap(row, *x, *edge);
         }
-        let lanes = swept
-            .iter()
-            .zip(&*self.edges)
-            .zip(signs)
-            .zip(self.out.iter_mut());
-        for (((swept, cap), sign), out) in lanes {
-            *out = signed(nearer(row, *swept, [*out, *cap]), *sign, band);
+        let lanes = swept.iter().zip(&*self.edges).zip(self.out.iter_mut());
+        for ((swept, cap), out) in lanes {
+            *out = clamped(nearer(row, *swept, [*out, *cap]), band);
         }
     }
 }
@@ -434,21 +422,24 @@ fn cap(row: CapRow, x: f64, edge: f32) -> [f32; 2] {
     [across as f32, root(across * across + edge * edge) as f32]
 }
 
-/// The lesser of the distances to the swept surface and to the cap, in the wedge, and that to the cap outside it.
+/// The lesser of the distances to the swept surface and to the cap, in the wedge, and that to the cap outside it; below
+/// 0 in the solid.
 ///
 /// From outside the solid in the wedge the cap is no nearer than the swept surface: the lesser is the latter, or
 /// equal to it but for the errors of both.
 #[inline(always)]
 fn nearer(row: CapRow, swept: f32, [across, cap]: [f32; 2]) -> f32 {
     let turned = row.sense * across < -row.guard;
-    let swept = if turned { swept.abs() } else { f32::INFINITY };
+    let full = if turned { swept } else { f32::INFINITY };
+    let size = full.abs();
     // The second comparison alone would do, were it not for caps that are NaN and do not matter.
-    let cap = if cap >= swept { swept } else { cap };
+    let cap = if cap >= size { size } else { cap };
     // A swept distance that is not a number stays so.
-    if across.abs() < swept { cap } else { swept }
+    let value = if across.abs() < size { cap } else { size };
+    if full < 0.0 { -value } else { value }
 }
 
-/// Unsigned distance of one voxel; NaN where it rests on an edge distance that is.
+/// Signed distance of one voxel; NaN where it rests on an edge distance that is.
 pub(super) fn combined(row: CapRow, x: f64, swept: f32, edge: f32) -> f32 {
     nearer(row, swept, cap(row, x, edge))
 }

@@ -16,7 +16,7 @@
 
 use super::bits::{self, SideBits};
 use super::body::{Asked, BodySampler, BodyScratch};
-use super::radial::{KnownLayer, Writing};
+use super::radial::Writing;
 use super::tally::Certainty;
 use crate::grid::GridSpec;
 use crate::math::Side;
@@ -142,10 +142,10 @@ impl Composite<'_> {
         (holds, open & !holds)
     }
 
-    /// Fills a layer with signed distances.
+    /// Fills layer `k`, whose voxels that are `inside` are known, with signed distances.
     pub(super) fn distances(
         &self,
-        known: KnownLayer<'_>,
+        (k, inside): (usize, &[u64]),
         writing: Writing<'_>,
         scratch: &mut CompositeScratch,
         out: &mut [f32],
@@ -153,20 +153,16 @@ impl Composite<'_> {
         let CompositeScratch { scratch, bodies } = scratch;
         for (sampler, layer) in self.bodies.iter().zip(&mut *bodies) {
             layer.distances.resize(out.len(), 0.0);
-            let own = KnownLayer {
-                k: known.k,
-                inside: &layer.inside,
-            };
             let writing = Writing {
                 stream: None,
                 ..writing
             };
-            sampler.distances(self.grid, own, writing, scratch, &mut layer.distances);
+            sampler.distances(self.grid, k, writing, scratch, &mut layer.distances);
         }
         let job = Combine {
             composite: *self,
             bodies,
-            inside: known.inside,
+            inside,
             out,
         };
         writing.kernel.dispatch(job);

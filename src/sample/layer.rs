@@ -5,7 +5,7 @@ use super::body::{Asked, BodySampler, BodyScratch};
 use super::composite::{Composite, CompositeScratch, Limits};
 use super::fraction::FractionSampler;
 use super::memory::Stream;
-use super::radial::{KnownLayer, LayerOut, Writing};
+use super::radial::{LayerOut, Writing};
 use super::tally::{Certainty, Tally};
 use crate::grid::GridSpec;
 use crate::math::Kernel;
@@ -287,7 +287,7 @@ impl<'a> LayerSampler<'a> {
         }
     }
 
-    /// Finds the distances of layer `k`, whose sides are known, where [`fills_distance`](Self::fills_distance) says so.
+    /// Finds the distances of layer `k`, whose sides are known if it is of a composite, where [`fills_distance`](Self::fills_distance) says so.
     fn find_distances(
         &self,
         k: usize,
@@ -301,11 +301,11 @@ impl<'a> LayerSampler<'a> {
             body,
             composite,
         } = scratch;
-        let known = KnownLayer { k, inside };
         if let Some(single) = self.single {
-            self.bodies[single].distances(self.grid, known, writing, body, out);
+            self.bodies[single].distances(self.grid, k, writing, body, out);
         } else {
-            self.composite().distances(known, writing, composite, out);
+            self.composite()
+                .distances((k, inside), writing, composite, out);
         }
     }
 
@@ -417,7 +417,7 @@ impl<'a> LayerSampler<'a> {
             let writing = self.writing(Some(stream));
             return single.twin_distances(self.grid, writing, &mut scratch.body, [layer, twin]);
         }
-        if single.is_none_or(BodySampler::distances_need_sides) {
+        if single.is_none() {
             self.find_sides(layer.k, scratch);
         }
         self.find_distances(layer.k, scratch, layer.values, Some(stream));

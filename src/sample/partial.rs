@@ -23,19 +23,18 @@
 //! from its own, as the rest is done in f64. Below 512 least spacings an ulp is at most 3.1e-5 of them, from there to
 //! 1024 it is 6.2e-5 and 2 ulp are allowed: the sum stays within max(2 ulp, 1e-4 of the least spacing).
 
-use super::bits;
 use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapPlane, Places, combined};
 use super::known::Known;
 use super::layer::stored;
 use super::plane::{BLOCK, PLACES, Plane, Radii, cell_and_place};
-use super::radial::{KnownLayer, Writing, is_inside, rings};
+use super::radial::{Writing, clamp, is_inside, rings, searched};
 use super::row_writer::RowWriter;
 use super::spread::spread;
 use crate::grid::GridSpec;
 use crate::math::{Dd, Kernel, Real};
 use crate::region::{BoundaryPiece, Chain, Extent, MeridianField, RadialTable};
-use crate::solid::{Revolved, signed};
+use crate::solid::{Revolved, Ring, signed};
 
 /// Shares of the least spacing.
 const ARCS: f64 = 2.0e-5;
@@ -94,7 +93,8 @@ struct PlaceScratch {
 struct Layer<'a> {
     body: &'a Revolved,
     grid: &'a GridSpec,
-    known: KnownLayer<'a>,
+    k: usize,
+    rings: &'a [Ring],
     writing: Writing<'a>,
     height: f64,
     swept: &'a RadialTable,
@@ -157,18 +157,18 @@ impl PartialSampler {
         &self,
         body: &Revolved,
         grid: &GridSpec,
-        known: KnownLayer<'_>,
+        k: usize,
         writing: Writing<'_>,
         scratch: &mut PartialScratch,
         out: &mut [f32],
     ) {
         let nx = grid.dims()[0];
         let frame = body.frame();
-        let height = frame.to_local_exact(grid.centre(0, 0, known.k))[2].f64();
+        let height = frame.to_local_exact(grid.centre(0, 0, k))[2].f64();
         let (scale, tolerance) = (frame.scale(), self.tolerance);
         let kernel = writing.kernel;
         (scratch.swept).fill(kernel, &self.swept, height, scale, tolerance);
-        let rings = rings(body, grid, known.k);
+        let rings = rings(body, grid, k);
         let inside = |a: f64| {
             // Nothing of the section is behind the axis.
             if a < 0.0 {
@@ -199,7 +199,8 @@ impl PartialSampler {
         let layer = Layer {
             body,
             grid,
-            known,
+            k,
+            rings: &rings,
             writing,
             height,
             swept,
@@ -303,7 +304,7 @@ impl PartialSampler {
         }
     }
 
-    /// Fills a row's distances from the swept surface, of either sign.
+    /// Fills a row's signed distances from the swept surface of the full turn.
     fn swept_row(
         &self,
         layer: &Layer<'_>,
@@ -332,8 +333,7 @@ impl PartialSampler {
                 if i < columns {
                     let place = radii.radii[i];
                     distances[i] = known.value(place, || {
-                        let (column, place) = cell_and_place(place);
-                        stored(layer.swept.size(&self.swept, column, place))
+                        searched(&self.swept, layer.swept, layer.rings, place)
                     });
                 }
             }
@@ -356,15 +356,14 @@ impl PartialSampler {
         let Writing { kernel, band, .. } = layer.writing;
         let row = self.caps.row(j);
         let x = self.caps.x();
-        let band = stored(band);
-        groups.set_inside(layer.known.inside, j * layer.grid.dims()[0]);
         let line = CapLine {
             row,
             x,
             ends: self.caps.ends(),
             swept: distances,
-            least: self.near.min(band),
-            band,
+            least: self.near,
+            // Signs are known only further away than that.
+            band: stored(band).max(self.near),
         };
         groups.fill(kernel, line, out, |lanes, edges| {
             let length = lanes.len();
@@ -395,12 +394,15 @@ impl PartialSampler {
         (groups, known): (&CapScratch, &mut Known),
         out: &mut [f32],
     ) {
-        let least = self.near.min(stored(layer.writing.band));
         for i in groups.doubtful(layer.grid.dims()[0]) {
-            if !(out[i].abs() >= least) {
+            if !(out[i].abs() >= self.near) {
                 let found = (distances[i], out[i]);
                 out[i] = self.mended(layer, [i, j], found, known);
             }
+        }
+        let band = stored(layer.writing.band);
+        if band < self.near {
+            clamp(out, band);
         }
     }
 
@@ -413,23 +415,19 @@ impl PartialSampler {
         (swept, found): (f32, f32),
         known_edges: &mut Known,
     ) -> f32 {
-        let (grid, known) = (layer.grid, layer.known);
-        let inside = bits::get(known.inside, j * grid.dims()[0] + i);
-        let value = if found.is_nan() {
+        let band = layer.writing.band;
+        if found.is_nan() {
             let (row, x) = (self.caps.row(j), self.caps.x()[i]);
             let place = row.place(x);
             let edge = known_edges.value(place, || self.edge(layer, place));
-            combined(row, x, swept, edge)
-        } else {
-            0.0
-        };
-        let band = layer.writing.band;
-        let distance = if value >= self.near {
-            f64::from(value)
-        } else {
-            let point = grid.centre(i, j, known.k);
-            layer.body.distance(point, inside, band)
-        };
+            let value = combined(row, x, swept, edge);
+            if value.abs() >= self.near {
+                return stored(f64::from(value).clamp(-band, band));
+            }
+        }
+        let point = layer.grid.centre(i, j, layer.k);
+        let inside = layer.body.contains(point);
+        let distance = layer.body.distance(point, inside, band);
         stored(signed(distance, inside).clamp(-band, band))
     }
 

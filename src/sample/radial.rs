@@ -64,14 +64,6 @@ pub(super) struct RadialScratch {
     known: Known,
 }
 
-/// A layer whose membership is known.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct KnownLayer<'a> {
-    pub(super) k: usize,
-    /// A bit for each voxel that is inside.
-    pub(super) inside: &'a [u64],
-}
-
 /// A layer to be filled.
 #[derive(Debug)]
 pub(super) struct LayerOut<'a> {
@@ -252,18 +244,6 @@ impl RadialSampler {
         (self.plane.bytes() + self.field.bytes()) as u64
     }
 
-    /// The distance where a cell does not tell its sign, or features must be searched; 0 where the sign is in question.
-    fn searched(&self, table: &RadialTable, rings: &[Ring], radius: u32) -> f32 {
-        let (cell, place) = cell_and_place(radius);
-        let size = table.size(&self.field, cell, place);
-        if let Some(sign) = table.sign(cell) {
-            return stored(sign * size);
-        }
-        let slack = self.field.cell() / PLACES;
-        let r = f64::from(radius) * slack;
-        is_inside(rings, r, slack).map_or(0.0, |inside| stored(signed(size, inside)))
-    }
-
     /// Fills in what the table left open of a row's stored part.
     fn mend(&self, at: Mend<'_>, marks: &[u8], part: &mut [f32]) {
         let (words, rest) = marks.as_chunks::<8>();
@@ -286,7 +266,7 @@ impl RadialSampler {
                         Some(distance) => stored(distance),
                         None => at
                             .known
-                            .value(radius, || self.searched(at.table, at.rings, radius)),
+                            .value(radius, || searched(&self.field, at.table, at.rings, radius)),
                     };
                 }
                 if !(part[i].abs() >= self.near) {
@@ -295,6 +275,23 @@ impl RadialSampler {
             }
         }
     }
+}
+
+/// The distance where a cell does not tell its sign, or features must be searched; 0 where the sign is in question.
+pub(super) fn searched(
+    field: &MeridianField,
+    table: &RadialTable,
+    rings: &[Ring],
+    radius: u32,
+) -> f32 {
+    let (cell, place) = cell_and_place(radius);
+    let size = table.size(field, cell, place);
+    if let Some(sign) = table.sign(cell) {
+        return stored(sign * size);
+    }
+    let slack = field.cell() / PLACES;
+    let r = f64::from(radius) * slack;
+    is_inside(rings, r, slack).map_or(0.0, |inside| stored(signed(size, inside)))
 }
 
 /// Whether a radius is within the solid; `None` where the ring is in question: on the surface, or near one whose radius

@@ -302,15 +302,15 @@ impl TiltedSampler {
         look_up(kernel, &self.table, points, least, lanes, (out, marks));
     }
 
-    /// Fills row `j` of layer `k` from voxel `i` on, whole blocks of it, with distances to the swept surface of the full
-    /// turn, of either sign; NaN where neither the table nor the field's leaf has one.
+    /// Fills row `j` of layer `k` from voxel `i` on, whole blocks of it, with signed distances to the swept surface of
+    /// the full turn; NaN where neither the table nor the field's leaf has one, and where the sign is in question.
     pub(super) fn swept_row(
         &self,
         kernel: Kernel,
+        body: &Revolved,
         [i, j, k]: [usize; 3],
         lanes: &mut Lanes,
-        marks: &mut [Marks],
-        out: &mut [f32],
+        (marks, out): (&mut [Marks], &mut [f32]),
     ) {
         let view = self.view(k);
         // Only what is not a number is told apart here.
@@ -322,7 +322,10 @@ impl TiltedSampler {
                 #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
                 let at = [(i + n) as f64, j as f64];
                 let ridge = look_up_ridge(&self.table, view, at, self.near());
-                let mended = || Some(stored(self.mended(kernel, view, at)?));
+                let mended = || {
+                    let (size, q) = self.mended(kernel, view, at)?;
+                    (size >= self.near).then(|| stored(signed(size, body.section_holds(q))))
+                };
                 out[n] = ridge.or_else(mended).unwrap_or(f32::NAN);
             }
         }
@@ -378,7 +381,8 @@ impl TiltedSampler {
                     if let Some(distance) = look_up_ridge(&self.table, view, at, self.near()) {
                         row[i] = distance;
                     } else {
-                        size = self.mended(kernel, view, at).filter(|d| *d >= self.near);
+                        let found = self.mended(kernel, view, at).map(|(size, _)| size);
+                        size = found.filter(|d| *d >= self.near);
                     }
                 }
                 if size.is_some() || !(f64::from(row[i].abs()) >= self.near) {
@@ -388,13 +392,13 @@ impl TiltedSampler {
         }
     }
 
-    /// The unsigned distance of a voxel, in scene units, from the features of its leaf.
+    /// The unsigned distance of a voxel, in scene units, from the features of its leaf, and its radius and height.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "places are within the lattice"
     )]
-    fn mended(&self, kernel: Kernel, view: LayerView, [i, j]: [f64; 2]) -> Option<f64> {
+    fn mended(&self, kernel: Kernel, view: LayerView, [i, j]: [f64; 2]) -> Option<(f64, [f64; 2])> {
         let x = view.x[0] + j * view.x[2] + i * view.x[1];
         let y = view.y[0] + j * view.y[1];
         let away = [
@@ -407,7 +411,8 @@ impl TiltedSampler {
         let per = self.table.places();
         let q = [corner[0] + away[0] / per, corner[1] + away[1] / per];
         let unit = self.table.step() / self.field.cell();
-        Some(self.field.distance(kernel, self.field.leaf(leaf), q) * unit)
+        let size = self.field.distance(kernel, self.field.leaf(leaf), q) * unit;
+        Some((size, q))
     }
 }
 

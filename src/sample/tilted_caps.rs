@@ -11,13 +11,12 @@
 //!
 //! as for either table; the distance to the cap passes the second's error on by a factor of at most 1.
 
-use super::bits;
 use super::blocks::BlockScratch;
 use super::cap_rows::{CapLine, CapScratch};
 use super::caps::{CapRow, GROUP, GUARD, LEAST_SINE, combined};
 use super::layer::stored;
 use super::lookup::{LANES, Lanes, Marks, Points, look_up, look_up_cap_ridge};
-use super::radial::{KnownLayer, Writing};
+use super::radial::{Writing, clamp};
 use super::row_writer::RowWriter;
 use super::tilted::{ARCS, CELLS, MOST_ARCS, NEAR, TiltedSampler, pays, step_for};
 use crate::grid::GridSpec;
@@ -70,7 +69,7 @@ pub(super) struct TiltedCapScratch {
 struct Layer<'a> {
     body: &'a Revolved,
     grid: &'a GridSpec,
-    known: KnownLayer<'a>,
+    k: usize,
     writing: Writing<'a>,
 }
 
@@ -149,7 +148,7 @@ impl TiltedCaps {
         &self,
         swept: &TiltedSampler,
         (body, grid): (&Revolved, &GridSpec),
-        known: KnownLayer<'_>,
+        k: usize,
         writing: Writing<'_>,
         scratch: &mut TiltedCapScratch,
         out: &mut [f32],
@@ -158,7 +157,7 @@ impl TiltedCaps {
         let layer = Layer {
             body,
             grid,
-            known,
+            k,
             writing,
         };
         let padded = self.x.len();
@@ -167,7 +166,7 @@ impl TiltedCaps {
         scratch.groups.resize(padded);
         scratch.writer.start(nx, LANES);
         let rooms = (&mut scratch.lanes, &mut scratch.blocks);
-        swept.far(writing, (grid, known.k), rooms, &mut scratch.far);
+        swept.far(writing, (grid, k), rooms, &mut scratch.far);
         for j in 0..ny {
             if writing.cancel.is_some_and(|cancel| cancel()) {
                 return;
@@ -210,7 +209,7 @@ impl TiltedCaps {
             ..
         } = scratch;
         let far = &far[j / LANES * self.ends.len()..][..self.ends.len()];
-        let k = layer.known.k;
+        let k = layer.k;
         let nx = layer.grid.dims()[0];
         let kernel = layer.writing.kernel;
         let (row, height) = self.view(j, k);
@@ -229,7 +228,7 @@ impl TiltedCaps {
                 if alike[0] == 0.0 {
                     let marks = &mut marks[..alike.len()];
                     let at = [(first + from) * GROUP, j, k];
-                    swept.swept_row(kernel, at, lanes, marks, part);
+                    swept.swept_row(kernel, layer.body, at, lanes, (&mut *marks, part));
                 } else {
                     part.fill(alike[0]);
                 }
@@ -239,15 +238,15 @@ impl TiltedCaps {
         // Lanes beyond the last voxel see what it sees.
         let last = distances[nx - 1];
         distances[nx..].fill(last);
-        groups.set_inside(layer.known.inside, j * nx);
         let band = stored(layer.writing.band);
         let line = CapLine {
             row,
             x: &self.x,
             ends: &self.ends,
             swept: distances,
-            least: self.near.min(band),
-            band,
+            least: self.near,
+            // Signs are known only further away than that.
+            band: band.max(self.near),
         };
         let out = &mut writer.row()[..self.x.len()];
         groups.fill(kernel, line, out, |range, edges| {
@@ -260,26 +259,26 @@ impl TiltedCaps {
                 out[i] = self.mended(layer, [i, j], (distances[i], out[i]));
             }
         }
+        if band < self.near {
+            clamp(out, band);
+        }
     }
 
     /// The value of a voxel from its distance from the swept surface, and from the value that the tables found: not a
     /// number, or too near to 0.
     fn mended(&self, layer: &Layer<'_>, [i, j]: [usize; 2], (swept, found): (f32, f32)) -> f32 {
-        let (grid, k) = (layer.grid, layer.known.k);
-        let inside = bits::get(layer.known.inside, j * grid.dims()[0] + i);
-        let value = if found.is_nan() {
-            let (row, height) = self.view(j, k);
-            let edge = self.edge(layer, (row, self.x[i], height));
-            combined(row, self.x[i], swept, edge)
-        } else {
-            0.0
-        };
         let band = layer.writing.band;
-        let distance = if value >= self.near {
-            f64::from(value)
-        } else {
-            layer.body.distance(grid.centre(i, j, k), inside, band)
-        };
+        if found.is_nan() {
+            let (row, height) = self.view(j, layer.k);
+            let edge = self.edge(layer, (row, self.x[i], height));
+            let value = combined(row, self.x[i], swept, edge);
+            if value.abs() >= self.near {
+                return stored(f64::from(value).clamp(-band, band));
+            }
+        }
+        let point = layer.grid.centre(i, j, layer.k);
+        let inside = layer.body.contains(point);
+        let distance = layer.body.distance(point, inside, band);
         stored(signed(distance, inside).clamp(-band, band))
     }
 
