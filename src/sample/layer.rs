@@ -287,7 +287,8 @@ impl<'a> LayerSampler<'a> {
         }
     }
 
-    /// Finds the distances of layer `k`, whose sides are known if it is of a composite, where [`fills_distance`](Self::fills_distance) says so.
+    /// Finds the distances of layer `k`, whose sides are known if it is of a composite, where
+    /// [`fills_distance`](Self::fills_distance) says so.
     fn find_distances(
         &self,
         k: usize,
