@@ -1,6 +1,6 @@
 //! What can go wrong with files, each with the path, the reason and the next step.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::exr::ExrError;
 
@@ -53,6 +53,25 @@ pub enum IoError {
     Occupied {
         /// The file in the way.
         path: PathBuf,
+    },
+    /// A file that is to be replaced is not the one that was written.
+    #[error("{} has been changed since it was written, so it is not replaced; move it away, or choose another output directory", path.display())]
+    Edited {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A replacement of files can neither be finished nor undone.
+    #[error(
+        "{}: the replacement of its files was interrupted, and can now neither be finished nor undone; what was there is in {} and stays there; when the directory can be written again, any run on it settles this, `voxlathe info` too",
+        path.display(), aside.display()
+    )]
+    Unsettled {
+        /// The output directory.
+        path: PathBuf,
+        /// Where its old files are.
+        aside: PathBuf,
+        /// What stands in the way.
+        source: Box<IoError>,
     },
     /// A name cannot be that of a file in a stack.
     #[error("{}: the file name {name:?} {reason}; remove that entry by hand, or use another directory", path.display())]
@@ -198,7 +217,7 @@ impl IoError {
     #[must_use]
     pub fn kind(&self) -> IoErrorKind {
         match self {
-            Self::Read { .. } | Self::Write { .. } => IoErrorKind::System,
+            Self::Read { .. } | Self::Write { .. } | Self::Unsettled { .. } => IoErrorKind::System,
             Self::Manifest { .. }
             | Self::Exr {
                 error: ExrError::Damaged { .. },
@@ -211,6 +230,18 @@ impl IoError {
     pub(crate) fn read(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Read { path, source }
+    }
+
+    pub(super) fn unsettled(path: &Path, aside: &Path) -> impl FnOnce(Self) -> Self {
+        let (path, aside) = (path.into(), aside.into());
+        move |error| match error {
+            already @ Self::Unsettled { .. } => already,
+            error => Self::Unsettled {
+                path,
+                aside,
+                source: Box::new(error),
+            },
+        }
     }
 
     pub(crate) fn write(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {

@@ -3,6 +3,9 @@
 //! The manifest has no times and no machine's names, its keys have one order and its numbers the
 //! shortest digits that give the same f64, so equal runs write equal bytes. What is unknown is
 //! `null`; NaN and infinities, which JSON does not have, are refused when it is written.
+//!
+//! Its last key, `manifest_blake3`, is the BLAKE3 digest of all the bytes before the digits themselves, and nothing but
+//! what closes the JSON follows: so every changed byte of the file shows.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -23,6 +26,15 @@ pub const FORMAT: &str = "voxlathe-stack";
 
 /// The version of the manifest's structure.
 pub const SCHEMA: u32 = 1;
+
+/// What the JSON of a manifest ends with before its digest is put there.
+const OBJECT_END: &[u8] = b"\n}";
+/// What stands before the digits of the digest, which is that of everything up to them.
+const DIGEST_KEY: &[u8] = b",\n  \"manifest_blake3\": \"";
+/// What stands after them.
+const END: &[u8] = b"\"\n}\n";
+/// How many they are.
+const DIGITS: usize = 64;
 
 /// Larger manifests are refused unread. A slice takes about 200 bytes, so this is a million slices.
 const MAX_BYTES: u64 = 256 << 20;
@@ -149,14 +161,19 @@ pub struct FileRecord {
 }
 
 impl Manifest {
-    /// The bytes of `manifest.json`: indented JSON and a line feed.
+    /// The bytes of `manifest.json`: indented JSON with the digest of itself, and a line feed.
     ///
     /// # Errors
     /// What is wrong when a value is not finite or a file name or count not usable.
     pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
         self.check()?;
         let mut bytes = serde_json::to_vec_pretty(self).map_err(|e| e.to_string())?;
-        bytes.push(b'\n');
+        // The object's end makes way for one more key.
+        bytes.truncate(bytes.len() - OBJECT_END.len());
+        bytes.extend(DIGEST_KEY);
+        let digest = blake3::hash(&bytes).to_hex();
+        bytes.extend(digest.bytes());
+        bytes.extend(END);
         Ok(bytes)
     }
 
@@ -164,7 +181,7 @@ impl Manifest {
     ///
     /// # Errors
     /// What is wrong, with line and column where the text itself is, when the manifest is not one
-    /// that this version writes.
+    /// that this version writes, or not as it was written.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
         struct Kind {
@@ -181,8 +198,16 @@ impl Manifest {
                 kind.schema
             ));
         }
-        let manifest: Self = serde_json::from_slice(bytes).map_err(|e| e.to_string())?;
+        let Some((head, digest)) = split_digest(bytes) else {
+            return Err("it does not end with the digest of itself: it was edited, or written by an earlier version".into());
+        };
+        let content = &head[..head.len() - DIGEST_KEY.len()];
+        let content = [content, OBJECT_END].concat();
+        let manifest: Self = serde_json::from_slice(&content).map_err(|e| e.to_string())?;
         manifest.check()?;
+        if blake3::hash(head).to_hex().as_bytes() != digest {
+            return Err("it is not as it was written: its digest of itself differs".into());
+        }
         Ok(manifest)
     }
 
@@ -290,16 +315,31 @@ pub(super) fn check_file_name(name: &str) -> Result<(), &'static str> {
     }
 }
 
-/// The names that an old manifest lists, of this version or another. They are not checked.
-pub(super) fn listed_names(path: &Path) -> Result<Vec<String>, IoError> {
+/// A manifest's bytes up to the digits of its own digest, and these.
+fn split_digest(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let rest = bytes.strip_suffix(END)?;
+    let (head, digits) = rest.split_at_checked(rest.len().checked_sub(DIGITS)?)?;
+    head.ends_with(DIGEST_KEY).then_some((head, digits))
+}
+
+/// A file that an old manifest lists.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub(super) struct ListedFile {
+    /// Its name; it is not checked.
+    pub(super) name: String,
+    /// Its size.
+    pub(super) bytes: u64,
+    /// Its BLAKE3 digest in hexadecimal.
+    pub(super) blake3: String,
+}
+
+/// The files that an old manifest lists, of this version or another.
+pub(super) fn listed_files(path: &Path) -> Result<Vec<ListedFile>, IoError> {
     #[derive(Deserialize)]
     struct Listing {
         format: String,
-        files: Vec<Entry>,
-    }
-    #[derive(Deserialize)]
-    struct Entry {
-        name: String,
+        files: Vec<ListedFile>,
+        manifest_blake3: Option<String>,
     }
     let refuse = |reason| IoError::Manifest {
         path: path.into(),
@@ -313,10 +353,16 @@ pub(super) fn listed_names(path: &Path) -> Result<Vec<String>, IoError> {
             listing.format
         )));
     }
-    Ok(listing.files.into_iter().map(|f| f.name).collect())
+    // Earlier versions had no digest; one that is there must be right.
+    let own = listing.manifest_blake3.as_deref();
+    let right = |(head, digits): (&[u8], &[u8])| blake3::hash(head).to_hex().as_bytes() == digits;
+    if own.is_some() && !split_digest(&bytes).is_some_and(right) {
+        return Err(IoError::Edited { path: path.into() });
+    }
+    Ok(listing.files)
 }
 
-fn read_capped(path: &Path) -> Result<Vec<u8>, IoError> {
+pub(super) fn read_capped(path: &Path) -> Result<Vec<u8>, IoError> {
     let data = std::fs::metadata(path).map_err(IoError::read(path))?;
     if !data.is_file() || data.len() > MAX_BYTES {
         return Err(IoError::Manifest {
@@ -428,11 +474,32 @@ pub(super) mod tests {
                 "warnings",
                 "material_volumes",
                 "certainty",
-                "scene"
+                "scene",
+                "manifest_blake3"
             ]
         );
         assert_eq!(Manifest::from_bytes(&bytes), Ok(manifest.clone()));
         assert_eq!(manifest.to_bytes().unwrap(), bytes);
+    }
+
+    #[test]
+    fn every_changed_byte_shows() {
+        let good = example().to_bytes().unwrap();
+        // Anybody can make the digest: it is that of what stands before it.
+        let (head, digits) = good.split_at(good.len() - 68);
+        assert_eq!(&digits[..64], blake3::hash(head).to_hex().as_bytes());
+        for at in 0..good.len() {
+            for bit in 0..8 {
+                let mut changed = good.clone();
+                changed[at] ^= 1 << bit;
+                assert!(Manifest::from_bytes(&changed).is_err(), "byte {at}");
+            }
+            let shorter = [&good[..at], &good[at + 1..]].concat();
+            assert!(Manifest::from_bytes(&shorter).is_err(), "byte {at}");
+            let longer = [&good[..at], b" ", &good[at..]].concat();
+            assert!(Manifest::from_bytes(&longer).is_err(), "byte {at}");
+        }
+        assert!(Manifest::from_bytes(&[&good[..], b"\n"].concat()).is_err());
     }
 
     #[test]

@@ -14,8 +14,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::directory::write_file_atomically;
 use super::error::IoError;
+use super::single::write_file_atomically;
 
 /// Bytes in the header of a binary STL file.
 const STL_HEADER: usize = 80;

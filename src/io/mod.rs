@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   layers ──> exr (bytes of one slice) ──> directory (staged, synced)
-//!                                               │ commit: renames, the manifest last
+//!                                               │ commit: one exchange, or renames by a journal
 //!                                               v
 //!   DIR/slice-0000.exr  DIR/slice-0001.exr  ...  DIR/manifest.json
 //! ```
@@ -14,19 +14,25 @@
 //! appears under its final name only when it is whole and synced.
 
 pub mod directory;
+pub(crate) mod ending;
 mod error;
 pub mod exr;
+pub(crate) mod leftovers;
 pub mod manifest;
 pub mod mesh;
 pub mod points;
+#[cfg(feature = "cli")]
+pub(crate) mod scratch;
+mod single;
 pub mod stack;
 mod syncer;
 pub mod verify;
 
-pub use directory::{StackDirectory, available_bytes, write_file_atomically};
+pub use directory::{StackDirectory, available_bytes};
 pub use error::{IoError, IoErrorKind};
 pub use manifest::Manifest;
 pub use mesh::write_mesh;
 pub use points::{read_points, write_columns};
+pub use single::write_file_atomically;
 pub use stack::{StackWriter, write_stack};
 pub use verify::{StackReport, verify_stack};

@@ -17,8 +17,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::directory::write_file_atomically;
 use super::error::IoError;
+use super::single::write_file_atomically;
 
 /// A longer line is no point; three numbers of 17 digits take 80 bytes.
 const MAX_LINE: u64 = 64 << 10;

@@ -87,7 +87,7 @@ fn trim_zeros(decimal: &str) -> &str {
 }
 
 /// `text` in printable ASCII: OpenEXR text is bytes, and readers differ on what they mean.
-pub(super) fn ascii(text: &str) -> String {
+pub(in super::super) fn ascii(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         if c == ' ' || c.is_ascii_graphic() {

@@ -96,6 +96,12 @@ impl Compression {
         }
     }
 
+    /// The compression that a file's header names, where stacks have it.
+    pub(super) fn from_exr(found: ExrCompression) -> Option<Self> {
+        let ways = Self::ALL.into_iter().filter(|way| *way != Self::Auto);
+        ways.into_iter().find(|way| way.to_exr() == found)
+    }
+
     pub(super) fn to_exr(self) -> ExrCompression {
         match self {
             Self::None | Self::Auto => ExrCompression::Uncompressed,

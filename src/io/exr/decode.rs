@@ -10,7 +10,7 @@ use ::exr::meta::header::LayerAttributes;
 use ::exr::prelude::{AttributeValue, SampleType, Vec2};
 use half::f16;
 
-use super::{Attribute, Attributes, ExrError, SampleKind};
+use super::{Attribute, Attributes, Compression, ExrError, SampleKind};
 
 /// No compression here shrinks by more than this: deflate reaches 1032, after the 24-bit rounding of
 /// `pxr24` 4/3 of that, runs in PIZ's Huffman code about 500. An image that promises more bytes for
@@ -89,6 +89,10 @@ pub struct DecodedLayer {
     pub channels: Vec<(String, DecodedSamples)>,
     /// Custom attributes of the types that stacks have.
     pub attributes: Attributes,
+    /// How the samples are compressed, where it is a way that stacks have.
+    pub compression: Option<Compression>,
+    /// The program that wrote the file.
+    pub software: Option<String>,
 }
 
 impl DecodedLayer {
@@ -158,6 +162,8 @@ pub fn decode_layer(bytes: &[u8]) -> Result<DecodedLayer, ExrError> {
         .map(|c| c.sample_type.bytes_per_sample() * width)
         .collect();
     let attributes = decoded_attributes(&header.own_attributes);
+    let compression = Compression::from_exr(header.compression);
+    let software = (header.own_attributes.software_name.as_ref()).map(ToString::to_string);
 
     let mut blocks = reader
         .all_chunks(true)
@@ -195,6 +201,8 @@ pub fn decode_layer(bytes: &[u8]) -> Result<DecodedLayer, ExrError> {
         size: [width, height],
         channels,
         attributes,
+        compression,
+        software,
     })
 }
 
@@ -216,7 +224,7 @@ fn decoded_attributes(own: &LayerAttributes) -> Attributes {
 #[cfg(test)]
 mod tests {
     use super::super::testing::{Layer, SIZE, attributes};
-    use super::super::{Compression, Samples, encode_layer};
+    use super::super::{Samples, encode_layer};
     use super::*;
 
     #[test]

@@ -27,6 +27,7 @@ mod samples;
 #[cfg(test)]
 mod testing;
 
+pub(super) use self::attributes::ascii;
 pub use self::attributes::{Attribute, Attributes, decimal17, layer_attributes};
 pub use self::compression::{Compression, UnknownCompression};
 pub use self::decode::{DecodedLayer, DecodedSamples, decode_layer};

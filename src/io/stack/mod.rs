@@ -495,7 +495,7 @@ pub(super) mod tests {
             units: "mm".into(),
             scene: Some(SceneLabel {
                 name: "ramp".into(),
-                hash: "f00".into(),
+                hash: blake3::hash(br#"{"schema":1}"#).to_hex().to_string(),
             }),
             ..StackOptions::default()
         }

@@ -16,9 +16,9 @@ pub(in super::super) struct Statistics {
     min: f64,
     max: f64,
     /// Of halves, which are whole numbers.
-    pub(super) count: u64,
+    pub(in super::super) count: u64,
     /// Of `fraction`.
-    pub(super) sum: f64,
+    pub(in super::super) sum: f64,
     pub(super) infinite: u64,
 }
 
