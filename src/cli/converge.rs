@@ -5,11 +5,10 @@ use super::failure::Failure;
 use super::interrupt;
 use super::output::Console;
 use crate::converge::{Plan, Row, Study, study};
-use crate::io::{IoError, write_file_atomically};
+use crate::io::{IoError, StackDirectory};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::path::Path;
 use std::process::ExitCode;
 
 const TABLE: &str = "converge.csv";
@@ -20,13 +19,16 @@ pub(super) fn run(
     common: &Common,
     console: &Console,
 ) -> Result<ExitCode, Failure> {
-    if let Some(directory) = &arguments.output {
-        check_free(directory, arguments.force)?;
-    }
     let scene = Scene::load_with(&arguments.scene, &common.set)?;
     for warning in scene.warnings() {
         console.warn(warning);
     }
+    let names = [TABLE, PLOT];
+    let output = arguments.output.as_deref();
+    let writer = output
+        .map(|path| StackDirectory::create_for(path, &names, arguments.force))
+        .transpose()
+        .map_err(refused)?;
     let plan = Plan {
         resolutions: arguments.resolutions.clone(),
         offsets: arguments.offsets,
@@ -35,20 +37,16 @@ pub(super) fn run(
     let found = study(&scene, &plan, &interrupt::check, &mut |_| bar.inc(1))?;
     bar.finish_and_clear();
     let mut files = Vec::new();
-    if let Some(directory) = &arguments.output {
-        let path = directory.join(TABLE);
-        std::fs::create_dir_all(directory).map_err(|source| IoError::Write {
-            path: directory.clone(),
-            source,
-        })?;
-        write_file_atomically(&path, |file| file.write_all(csv(&found).as_bytes()))?;
-        files.push(path);
-        let path = directory.join(PLOT);
+    if let Some(writer) = writer {
         let png = found
             .plot(scene.name(), scene.model().units.name())
             .to_png()?;
-        write_file_atomically(&path, |file| file.write_all(&png))?;
-        files.push(path);
+        let path = writer.path().to_path_buf();
+        for (name, bytes) in names.into_iter().zip([csv(&found).into_bytes(), png]) {
+            writer.write_file(name, &bytes)?;
+            files.push(path.join(name));
+        }
+        writer.commit_files()?;
     }
     let document = json!({
         "scene": scene.name(),
@@ -66,22 +64,14 @@ pub(super) fn run(
 }
 
 /// A directory that holds something is kept as it is unless the user says otherwise.
-fn check_free(directory: &Path, force: bool) -> Result<(), Failure> {
-    let mut held = match std::fs::read_dir(directory) {
-        Ok(held) => held,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(e) => {
-            let shown = directory.display();
-            return Err(Failure::usage(format!("cannot write into {shown}: {e}")));
-        }
-    };
-    if held.next().is_some() && !force {
-        let shown = directory.display();
-        return Err(Failure::usage(format!(
-            "{shown} is not empty; choose another directory, or add --force to replace {TABLE} and {PLOT} in it"
-        )));
+fn refused(error: IoError) -> Failure {
+    match error {
+        IoError::NotEmpty { path, .. } => Failure::usage(format!(
+            "{} is not empty; choose another directory, or add --force to replace {TABLE} and {PLOT} in it",
+            path.display()
+        )),
+        other => other.into(),
     }
-    Ok(())
 }
 
 fn entry(row: &Row) -> Value {

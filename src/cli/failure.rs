@@ -19,6 +19,8 @@ pub(super) enum Failure {
     Output(String),
     /// Answers that should be equal are not.
     Disagreement(String),
+    /// A signal ended the run, and this is how things are.
+    Interrupted(String),
     /// Anything of the library.
     Library(Error),
 }
@@ -40,8 +42,13 @@ impl Failure {
         Self::Output(text.into())
     }
 
+    pub(super) fn interrupted(text: impl Into<String>) -> Self {
+        Self::Interrupted(text.into())
+    }
+
     fn code(&self) -> u8 {
         match self {
+            Self::Interrupted(_) => interrupt::code(),
             Self::Usage(_) => 2,
             Self::Disagreement(_) => 1,
             Self::Output(_) => 3,
@@ -61,7 +68,10 @@ impl Failure {
     /// The message with everything that caused it.
     fn message(&self) -> String {
         match self {
-            Self::Usage(text) | Self::Output(text) | Self::Disagreement(text) => text.clone(),
+            Self::Usage(text)
+            | Self::Output(text)
+            | Self::Disagreement(text)
+            | Self::Interrupted(text) => text.clone(),
             Self::Library(error) => {
                 let mut text = error.to_string();
                 let mut cause = std::error::Error::source(error);
@@ -82,7 +92,7 @@ impl Failure {
         } else {
             "error"
         };
-        let mut text = format!("{label}: {}\n", self.message());
+        let mut text = format!("{label}: {}\n", output::visible(&self.message()));
         if let Self::Library(Error::Scene(scene)) = self {
             text.push_str(&excerpt(scene, console.colored()));
         }
@@ -90,7 +100,7 @@ impl Failure {
         let _ = std::io::stderr().write_all(text.as_bytes());
         if console.json() {
             let document = serde_json::json!({ "error": { "message": self.message(), "exit_code": self.code() } });
-            let _ = output::print(&format!("{document:#}\n"));
+            let _ = console.document(&document);
         }
         ExitCode::from(self.code())
     }

@@ -42,12 +42,14 @@ pub(super) fn run(
         "warnings": m.warnings,
         "missing": report.missing,
         "altered": altered,
+        "wrong": report.wrong,
         "extra": report.extra,
         "ok": report.is_intact(),
     });
     let mut text = holdings(m);
     let damaged = report.missing.iter().map(|n| format!("missing      {n}\n"));
     let damaged = damaged.chain(altered.iter().map(|n| format!("altered      {n}\n")));
+    let damaged = damaged.chain(report.wrong.iter().map(|w| format!("wrong        {w}\n")));
     text.extend(damaged.chain(report.extra.iter().map(|n| format!("not listed   {n}\n"))));
     let intact = report.is_intact();
     let _ = writeln!(

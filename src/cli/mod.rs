@@ -61,7 +61,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         .num_threads(threads)
         .build_global()
         .map_err(|e| Failure::usage(format!("cannot start {threads} threads: {e}")))?;
-    interrupt::listen();
+    interrupt::listen(*console);
     match &arguments.command {
         Command::Voxelize(a) => voxelize::run(a, common, console),
         Command::Query(a) => query::run(a, common, console),

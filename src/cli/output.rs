@@ -3,14 +3,19 @@
 use super::arguments::{Color, Common};
 use super::failure::Failure;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::borrow::Cow;
 use std::io::{IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is said of an empty composite.
 pub(super) const NOTHING_LEFT: &str =
     "nothing is left of the solids: what is added is all subtracted, or not in what intersects it";
 
+/// Whether the document of this run is printed, or being printed: there is one, also where a signal comes.
+static ANSWERED: AtomicBool = AtomicBool::new(false);
+
 /// The user's wishes about output.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Console {
     json: bool,
     quiet: bool,
@@ -46,7 +51,7 @@ impl Console {
     pub(super) fn say(&self, text: &str) {
         if !self.quiet {
             // Nobody is left to tell when standard error is gone.
-            let _ = writeln!(std::io::stderr(), "{text}");
+            let _ = writeln!(std::io::stderr(), "{}", visible(text));
         }
     }
 
@@ -56,18 +61,28 @@ impl Console {
         } else {
             "warning"
         };
-        self.say(&format!("{label}: {text}"));
+        if !self.quiet {
+            let _ = writeln!(std::io::stderr(), "{label}: {}", visible(text));
+        }
     }
 
     /// The result: the document, or the text for people, on standard output.
     pub(super) fn result(&self, document: &serde_json::Value, text: &str) -> Result<(), Failure> {
         if self.json {
-            print(&format!("{document:#}\n"))
+            self.document(document)
         } else if self.quiet {
             Ok(())
         } else {
-            print(text)
+            print(&visible(text))
         }
+    }
+
+    /// The one document of a run, on standard output.
+    pub(super) fn document(&self, document: &serde_json::Value) -> Result<(), Failure> {
+        if ANSWERED.swap(true, Ordering::SeqCst) {
+            return Ok(());
+        }
+        print(&format!("{document:#}\n"))
     }
 
     /// A bar that counts to `length`; hidden where nobody watches.
@@ -86,6 +101,27 @@ impl Console {
         }
         bar
     }
+}
+
+/// Text with control characters, and those that turn the direction of writing, escaped: names come from files, and a
+/// terminal obeys them. Lines stay lines.
+pub(super) fn visible(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| {
+        let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        turns || (c.is_control() && c != '\n' && c != '\t')
+    };
+    if !text.contains(obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if obeyed(c) {
+            shown.extend(c.escape_unicode());
+        } else {
+            shown.push(c);
+        }
+    }
+    Cow::Owned(shown)
 }
 
 /// Writes to standard output; a reader that has gone is no failure of ours.

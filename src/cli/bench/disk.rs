@@ -10,6 +10,7 @@ use crate::grid::GridSpec;
 use crate::io::exr::{
     Compression, LayerChannels, LayerEncoder, SampleKind, decode_layer, layer_attributes,
 };
+use crate::io::scratch::ScratchDirectory;
 use crate::io::stack::{ChannelSpec, StackOptions, StackSummary, StackWriter, largest_stack_bytes};
 use crate::io::{available_bytes, verify_stack};
 use crate::sample::LayerBuffers;
@@ -19,7 +20,6 @@ use std::hint::black_box;
 use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// Layers that the stages `encode` and `write` hold at once, at most.
 const SAMPLED: usize = 64;
@@ -174,7 +174,7 @@ impl Job<'_> {
                 output::bytes(needed)
             )));
         }
-        let stack = |folder: &TempDir| -> Result<Duration, Failure> {
+        let stack = |folder: &ScratchDirectory| -> Result<Duration, Failure> {
             let begin = Instant::now();
             let options = StackOptions {
                 compression: Compression::None,
@@ -252,9 +252,9 @@ fn plain_failed(error: &std::io::Error) -> Failure {
     Failure::files(format!("plain writes for comparison: {error}"))
 }
 
-fn temporary() -> Result<TempDir, Failure> {
-    tempfile::tempdir().map_err(|e| {
-        let place = std::env::temp_dir();
+fn temporary() -> Result<ScratchDirectory, Failure> {
+    let place = std::env::temp_dir();
+    ScratchDirectory::create(&place, "voxlathe-bench-").map_err(|e| {
         Failure::files(format!(
             "no temporary directory in {}: {e}; set TMPDIR",
             place.display()
