@@ -412,7 +412,9 @@ impl CutKind {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = "Exit code 1 when a file is missing or its digest differs.")]
+#[command(
+    after_help = "Exit code 1 when a file is missing, its digest differs, or the manifest says what the slices contradict."
+)]
 pub(super) struct Info {
     /// Directory of a finished stack
     #[arg(value_name = "DIR")]

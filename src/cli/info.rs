@@ -8,6 +8,9 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::process::ExitCode;
 
+/// Contradictions that are shown to people: each slice may have the same one.
+const SHOWN: usize = 20;
+
 pub(super) fn run(
     arguments: &Info,
     _common: &Common,
@@ -49,7 +52,11 @@ pub(super) fn run(
     let mut text = holdings(m);
     let damaged = report.missing.iter().map(|n| format!("missing      {n}\n"));
     let damaged = damaged.chain(altered.iter().map(|n| format!("altered      {n}\n")));
-    let damaged = damaged.chain(report.wrong.iter().map(|w| format!("wrong        {w}\n")));
+    let wrong = report.wrong.iter().take(SHOWN);
+    let damaged = damaged.chain(wrong.map(|w| format!("wrong        {w}\n")));
+    let more = report.wrong.len().saturating_sub(SHOWN);
+    let more = (more > 0).then(|| format!("wrong        and {more} more\n"));
+    let damaged = damaged.chain(more);
     text.extend(damaged.chain(report.extra.iter().map(|n| format!("not listed   {n}\n"))));
     let intact = report.is_intact();
     let _ = writeln!(

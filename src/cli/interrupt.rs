@@ -32,6 +32,9 @@ const SAME: Duration = Duration::from_secs(1);
 /// The signal that came first, or 0.
 static SIGNAL: AtomicI32 = AtomicI32::new(0);
 
+/// Whether the watcher is ending the process.
+static ENDING: AtomicBool = AtomicBool::new(false);
+
 /// Takes note of requests to end instead of dying at once.
 ///
 /// * `console`: where to say why the process ends.
@@ -83,6 +86,7 @@ fn watch(mut signals: Signals, console: Console) {
 /// Ends the process, which has not noticed the signal by itself.
 fn end(console: Console) {
     std::thread::sleep(GRACE);
+    ENDING.store(true, Ordering::SeqCst);
     let failure = if ending::end(PATIENCE) {
         Failure::from(Error::Interrupted)
     } else {
@@ -99,6 +103,13 @@ fn end(console: Console) {
     });
     let _ = told.recv_timeout(TELLING);
     std::process::exit(i32::from(code()));
+}
+
+/// Leaves the last word to the watcher where it is ending the process: what fails meanwhile fails for that reason.
+pub(super) fn yield_to_end() {
+    while ENDING.load(Ordering::SeqCst) {
+        std::thread::sleep(GRACE);
+    }
 }
 
 /// An error when a signal has come.

@@ -42,7 +42,10 @@ pub fn run() -> ExitCode {
     let console = Console::new(&arguments.common);
     match execute(&arguments, &console) {
         Ok(code) => code,
-        Err(failure) => failure.report(&console),
+        Err(failure) => {
+            interrupt::yield_to_end();
+            failure.report(&console)
+        }
     }
 }
 

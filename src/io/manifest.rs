@@ -167,14 +167,8 @@ impl Manifest {
     /// What is wrong when a value is not finite or a file name or count not usable.
     pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
         self.check()?;
-        let mut bytes = serde_json::to_vec_pretty(self).map_err(|e| e.to_string())?;
-        // The object's end makes way for one more key.
-        bytes.truncate(bytes.len() - OBJECT_END.len());
-        bytes.extend(DIGEST_KEY);
-        let digest = blake3::hash(&bytes).to_hex();
-        bytes.extend(digest.bytes());
-        bytes.extend(END);
-        Ok(bytes)
+        let bytes = serde_json::to_vec_pretty(self).map_err(|e| e.to_string())?;
+        Ok(with_digest(bytes))
     }
 
     /// The manifest in `bytes`.
@@ -199,7 +193,7 @@ impl Manifest {
             ));
         }
         let Some((head, digest)) = split_digest(bytes) else {
-            return Err("it does not end with the digest of itself: it was edited, or written by an earlier version".into());
+            return Err(NO_DIGEST.into());
         };
         let content = &head[..head.len() - DIGEST_KEY.len()];
         let content = [content, OBJECT_END].concat();
@@ -315,6 +309,19 @@ pub(super) fn check_file_name(name: &str) -> Result<(), &'static str> {
     }
 }
 
+const NO_DIGEST: &str =
+    "it does not end with the digest of itself: it was edited, or written by an earlier version";
+
+/// An object as indented JSON with one more key: the digest of what stands before it.
+pub(super) fn with_digest(mut object: Vec<u8>) -> Vec<u8> {
+    object.truncate(object.len() - OBJECT_END.len());
+    object.extend(DIGEST_KEY);
+    let digest = blake3::hash(&object).to_hex();
+    object.extend(digest.bytes());
+    object.extend(END);
+    object
+}
+
 /// A manifest's bytes up to the digits of its own digest, and these.
 fn split_digest(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let rest = bytes.strip_suffix(END)?;
@@ -333,13 +340,12 @@ pub(super) struct ListedFile {
     pub(super) blake3: String,
 }
 
-/// The files that an old manifest lists, of this version or another.
+/// The files that an old manifest lists, provided that it is as it was written.
 pub(super) fn listed_files(path: &Path) -> Result<Vec<ListedFile>, IoError> {
     #[derive(Deserialize)]
     struct Listing {
         format: String,
         files: Vec<ListedFile>,
-        manifest_blake3: Option<String>,
     }
     let refuse = |reason| IoError::Manifest {
         path: path.into(),
@@ -353,10 +359,9 @@ pub(super) fn listed_files(path: &Path) -> Result<Vec<ListedFile>, IoError> {
             listing.format
         )));
     }
-    // Earlier versions had no digest; one that is there must be right.
-    let own = listing.manifest_blake3.as_deref();
-    let right = |(head, digits): (&[u8], &[u8])| blake3::hash(head).to_hex().as_bytes() == digits;
-    if own.is_some() && !split_digest(&bytes).is_some_and(right) {
+    // What is not as it was written may list anything.
+    let (head, digest) = split_digest(&bytes).ok_or_else(|| refuse(NO_DIGEST.into()))?;
+    if blake3::hash(head).to_hex().as_bytes() != digest {
         return Err(IoError::Edited { path: path.into() });
     }
     Ok(listing.files)

@@ -17,7 +17,7 @@ use std::io;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{Access, CWD, RenameFlags};
+use rustix::fs::Access;
 
 use super::journal::{new_place, rename_onto_nothing};
 use super::staging::{STAGING, is_in_use};
@@ -73,6 +73,7 @@ impl Places {
 }
 
 /// Whether a directory has extended attributes, access lists among them, that a new one would not have.
+#[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
 fn has_attributes(path: &Path) -> bool {
     let mut names = vec![0_u8; 4096];
     match rustix::fs::listxattr(path, names.as_mut_slice()) {
@@ -81,6 +82,11 @@ fn has_attributes(path: &Path) -> bool {
             .any(|name| !name.is_empty() && name != b"security.selinux"),
         Err(error) => error != rustix::io::Errno::NOTSUP,
     }
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
+fn has_attributes(_path: &Path) -> bool {
+    true
 }
 
 /// Puts the staged files in the place of the directory, which must hold nothing but what they replace.
@@ -122,14 +128,15 @@ pub(super) fn exchange(directory: &Path, staging: &Path) -> Result<Exchanged, Io
 
 #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
 fn swap(places: &Places) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags};
     let (own, other) = (&places.own, &places.other);
-    Ok(rustix::fs::renameat_with(
-        CWD,
-        other,
-        CWD,
-        own,
-        RenameFlags::EXCHANGE,
-    )?)
+    rustix::fs::renameat_with(CWD, other, CWD, own, RenameFlags::EXCHANGE)?;
+    Ok(())
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
+fn swap(_places: &Places) -> io::Result<()> {
+    Err(rustix::io::Errno::NOSYS.into())
 }
 
 /// Whether the system says that it cannot exchange these directories, rather than that something is wrong.

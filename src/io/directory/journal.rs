@@ -17,7 +17,6 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{CWD, RenameFlags};
 use serde::{Deserialize, Serialize};
 
 use super::{MANIFEST_NAME, exists, sync_directory};
@@ -236,7 +235,7 @@ fn rename(from: &Path, to: &Path, shown: &Path) -> Result<(), IoError> {
 /// Renames where nothing has the new name.
 pub(super) fn rename_onto_nothing(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::io::Errno;
-    match rustix::fs::renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
+    match rename_new(from, to) {
         // Not every file system can; then a name that comes in this very moment is lost.
         Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => {
             if exists(to) {
@@ -246,6 +245,17 @@ pub(super) fn rename_onto_nothing(from: &Path, to: &Path) -> io::Result<()> {
         }
         other => Ok(other?),
     }
+}
+
+#[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
+fn rename_new(from: &Path, to: &Path) -> rustix::io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags};
+    rustix::fs::renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE)
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
+fn rename_new(_from: &Path, _to: &Path) -> rustix::io::Result<()> {
+    Err(rustix::io::Errno::NOSYS)
 }
 
 /// A staging directory's place for new files.

@@ -5,7 +5,7 @@
 
 use std::fs::{self, File};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -90,8 +90,8 @@ impl Staging {
 
 /// Makes the directory and locks it; `None` where others remove it in the same moment.
 fn make(directory: &Path, path: &Path) -> Result<Option<File>, IoError> {
-    let made = fs::DirBuilder::new().mode(0o700).create(path);
-    made.map_err(IoError::write(directory))?;
+    // Other users may look into it as into any directory: a reader has to see that a replacement is under way.
+    fs::create_dir(path).map_err(IoError::write(directory))?;
     match open_directory(path).and_then(|handle| claim(handle, path)) {
         Ok(Holder::Us(lock) | Holder::Unknown(lock)) => Ok(Some(lock)),
         Ok(Holder::Another | Holder::Nobody) => Ok(None),

@@ -13,7 +13,9 @@ fn old_manifest(names: &[&str]) -> String {
         .iter()
         .map(|n| serde_json::json!({ "name": n, "bytes": 3, "blake3": hash }))
         .collect();
-    serde_json::json!({ "format": "voxlathe-stack", "files": files }).to_string()
+    let object = serde_json::json!({ "format": "voxlathe-stack", "files": files });
+    let object = serde_json::to_vec_pretty(&object).unwrap();
+    String::from_utf8(manifest::with_digest(object)).unwrap()
 }
 
 #[test]
