@@ -201,7 +201,7 @@ fn commands_that_are_told_to_end_leave_nothing() {
 
 /// Commands that take long, each at a work of its own.
 fn long_runs(place: &Path) -> Vec<Vec<String>> {
-    let points: Vec<[f64; 3]> = (0..400_000)
+    let points: Vec<[f64; 3]> = (0..1_500_000)
         .map(|n| [f64::from(n % 1709), f64::from(n % 1301), f64::from(n % 70)])
         .collect();
     write_npy(&place.join("many.npy"), &points);
@@ -286,8 +286,10 @@ fn every_command_ends_within_a_second_of_a_signal() {
             let took = sent.elapsed();
             let status = status.unwrap_or_else(|| panic!("{arguments:?}: {signal:?} is ignored"));
             let code = if signal == Signal::INT { 130 } else { 143 };
+            // One that was done in this moment may say so.
+            let done = status.success() && took < Duration::from_millis(300);
             assert!(
-                early.is_some() || status.code() == Some(code),
+                early.is_some() || done || status.code() == Some(code),
                 "{arguments:?}: {signal:?}: {status}"
             );
             // The machine may be busy with other tests.
