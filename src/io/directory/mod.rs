@@ -353,8 +353,9 @@ fn prepare(
     force: bool,
     find: &dyn Fn(&Path) -> Result<Old, IoError>,
 ) -> Result<(Staging, Old), IoError> {
-    if !force && !is_unsettled(path) {
-        // Looked at first: a directory that is to be refused need not be writable.
+    if !force && !exists(&path.join(STAGING)) {
+        // Looked at first: a directory that is to be refused need not be writable. What a killed run has left is
+        // swept all the same.
         find(path)?;
     }
     let unfinished = if force {

@@ -561,3 +561,17 @@ fn leftovers_of_single_files_are_swept_and_living_ones_are_not() {
     assert_eq!(fs::read(&file).unwrap(), b"one");
     assert_eq!(listing(out.path()), ["points.csv"]);
 }
+
+/// Killed between the last rename and the removal of the staging directory.
+#[test]
+fn what_is_dead_goes_although_the_directory_is_refused() {
+    let out = tempfile::tempdir().unwrap();
+    write_all(out.path(), &[("manifest.json", "{}")]);
+    write_all(&out.path().join(STAGING).join("old"), &[("a", "old")]);
+    let error = StackDirectory::create(out.path(), false).unwrap_err();
+    assert!(
+        matches!(error, IoError::NotEmpty { entries: 1, .. }),
+        "{error}"
+    );
+    assert_eq!(listing(out.path()), ["manifest.json"]);
+}
