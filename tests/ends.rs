@@ -171,7 +171,7 @@ fn stopped_at_random_moments(signal: Signal, salt: u64) {
             );
             if told {
                 // It was asked, and had the time to clean up.
-                assert_eq!(hidden(place), [PathBuf::new(); 0], "{arguments:?}");
+                assert_eq!(hidden(place), Vec::<PathBuf>::new(), "{arguments:?}");
             }
             if forced {
                 let stack = &arguments[3];
@@ -184,7 +184,7 @@ fn stopped_at_random_moments(signal: Signal, salt: u64) {
                 again.success() || refused,
                 "{arguments:?} at {moment:?}, then {again}"
             );
-            assert_eq!(hidden(place), [PathBuf::new(); 0], "{arguments:?}");
+            assert_eq!(hidden(place), Vec::<PathBuf>::new(), "{arguments:?}");
         }
     }
 }
@@ -298,7 +298,7 @@ fn every_command_ends_within_a_second_of_a_signal() {
                 "{arguments:?}: {signal:?} took {took:?}"
             );
             assert!(took < Duration::from_secs(4), "{arguments:?}: {took:?}");
-            assert_eq!(hidden(t.path()), [PathBuf::new(); 0], "{arguments:?}");
+            assert_eq!(hidden(t.path()), Vec::<PathBuf>::new(), "{arguments:?}");
             assert!(!t.path().join("s").exists(), "{arguments:?}");
         }
     }

@@ -14,6 +14,10 @@
 //! appears under its final name only when it is whole and synced.
 
 pub mod directory;
+#[cfg_attr(
+    not(feature = "cli"),
+    allow(dead_code, reason = "only the command is ended by signals")
+)]
 pub(crate) mod ending;
 mod error;
 pub mod exr;

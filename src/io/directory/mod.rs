@@ -89,6 +89,10 @@ impl StackDirectory {
     ///
     /// # Errors
     /// As [`create`](Self::create), but for those of a manifest.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only a command writes files that are no stack")
+    )]
     pub(crate) fn create_for(path: &Path, names: &[&str], force: bool) -> Result<Self, IoError> {
         Self::create_with(path, force, &|path| Old::named(path, names, force))
     }
@@ -231,6 +235,10 @@ impl StackDirectory {
     ///
     /// # Errors
     /// As [`commit`](Self::commit).
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only a command writes files that are no stack")
+    )]
     pub(crate) fn commit_files(mut self) -> Result<(), IoError> {
         self.finish_files()?;
         let _begun = ending::begin().map_err(IoError::write(&self.path))?;

@@ -86,6 +86,10 @@ impl Old {
     }
 
     /// As [`find`](Self::find), where only files of these names make way.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only a command writes files that are no stack")
+    )]
     pub(super) fn named(path: &Path, names: &[&str], force: bool) -> Result<Self, IoError> {
         if !force {
             return Self::find(path, false);
