@@ -13,6 +13,7 @@
 //! * Units: lengths in scene units.
 //! * Accuracy: see [`tessellate()`] for the mesh, [`MeshTree`] for the questions.
 
+mod arrangement;
 mod bvh;
 mod cap;
 mod crossings;
@@ -71,5 +72,21 @@ pub enum MeshError {
     Open {
         /// Where, in scene units of the profile.
         at: [f64; 2],
+    },
+    /// Walls or gaps of a partial turn's profile that the coordinates of a cap do not tell apart.
+    #[error(
+        "walls of the profile are too thin for a cap near (r, z) = ({}, {})", at[0], at[1]
+    )]
+    Thin {
+        /// Where, in scene units of the profile.
+        at: [f64; 2],
+    },
+    /// Triangles that do not close.
+    #[error(
+        "the triangles do not close near ({}, {}, {}); another chord error may do", at[0], at[1], at[2]
+    )]
+    Torn {
+        /// An end of an edge that is not used once in each direction, in scene units.
+        at: [f64; 3],
     },
 }

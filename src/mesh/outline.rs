@@ -16,7 +16,7 @@
 //! The nearest-point map takes the curve continuously onto its chord, ends to ends, so every point
 //! of the chord is within δ of the curve as well.
 //!
-//! Ends of pieces are welded by index. Where more than two chords end in one point, each wedge of
+//! Ends of pieces are welded by index; gaps that stay, shorter than the tolerance, become chords. Where more than two chords end in one point, each wedge of
 //! the region there has a corner of its own:
 //!
 //! ```text
@@ -30,7 +30,7 @@
 
 use crate::math::bernstein;
 use crate::math::{Dd, Real};
-use crate::region::{BoundaryPiece, Piece, SAME_FACE, welded};
+use crate::region::{BoundaryPiece, Box2, BoxTree, Piece, SAME_FACE, welded};
 use robust::{Coord, orient2d};
 use std::cmp::Ordering;
 
@@ -69,9 +69,8 @@ impl Outline {
         most: usize,
     ) -> Result<Self, NoOutline> {
         let first = boundary.first().map_or([0.0; 2], |b| b.piece.bounds.min);
-        let Some(pieces) = welded(boundary.to_vec(), SAME_FACE) else {
-            return Err(NoOutline::Open(first));
-        };
+        // Where curves touch without crossing, parts too short to tell inside from outside are missing.
+        let pieces = welded(boundary.to_vec(), SAME_FACE).unwrap_or_else(|| boundary.to_vec());
         let mut points = Points::new(&pieces);
         let mut error = 0.0_f64;
         let mut chords: Vec<[u32; 2]> = Vec::new();
@@ -89,10 +88,20 @@ impl Outline {
             chords.extend(run.windows(2).map(|w| [w[0], w[1]]));
         }
         points.merge(&mut chords);
+        let gap = close_gaps(&points.all, &mut chords, tolerance).map_err(NoOutline::Open)?;
+        error = error.max(gap);
         let mut loops = loops(&points.all, &chords).map_err(NoOutline::Open)?;
         let left_out = SLIVER * tolerance;
         for corners in &mut loops {
             leave_out(corners, &points.all, left_out);
+        }
+        // What lies on the axis sweeps nothing and encloses nothing.
+        loops.retain(|l| l.iter().any(|&i| points.all[i as usize][0] > 0.0));
+        if leave_out_specks(&mut loops, &points.all, left_out) {
+            error += 2.0 * left_out;
+        }
+        if loops.is_empty() {
+            return Err(NoOutline::Open(first));
         }
         let points = used(points.all, &mut loops);
         Ok(Self {
@@ -101,6 +110,15 @@ impl Outline {
             // Points move by a rounding when they are evaluated and when they are welded.
             error: error + left_out + 8.0 * ROUNDING,
         })
+    }
+
+    /// The chords of all loops, in their order.
+    pub(super) fn chords(&self) -> Vec<[u32; 2]> {
+        let of_loop = |l: &Vec<u32>| {
+            let ends = l.iter().copied().zip(l.iter().copied().cycle().skip(1));
+            ends.map(|(a, b)| [a, b]).collect::<Vec<_>>()
+        };
+        self.loops.iter().flat_map(of_loop).collect()
     }
 
     /// The largest r.
@@ -153,8 +171,54 @@ fn leave_out(corners: &mut Vec<u32>, points: &[[f64; 2]], near: f64) {
     }
 }
 
+/// Leaves out loops no larger than `near` that are no further than that from a larger one, as where
+/// curves touch; whether there was any.
+fn leave_out_specks(loops: &mut Vec<Vec<u32>>, points: &[[f64; 2]], near: f64) -> bool {
+    let at = |i: u32| points[i as usize];
+    let is_speck = |l: &Vec<u32>| {
+        let first = at(l[0]);
+        let within = |&i: &u32| (at(i)[0] - first[0]).hypot(at(i)[1] - first[1]) <= near;
+        l.iter().all(within)
+    };
+    if !loops.iter().any(is_speck) {
+        return false;
+    }
+    let large: Vec<[[f64; 2]; 2]> = loops
+        .iter()
+        .filter(|l| !is_speck(l))
+        .flat_map(|l| (0..l.len()).map(|i| [l[i], l[(i + 1) % l.len()]].map(at)))
+        .collect();
+    let boxes: Vec<Box2> = large.iter().map(|[p, q]| Box2::around(*p, *q)).collect();
+    let tree = BoxTree::new(&boxes);
+    let before = loops.len();
+    loops.retain(|l| {
+        let mut limit = near * near;
+        let mut found = false;
+        if is_speck(l) {
+            tree.visit_nearest(at(l[0]), limit, |i, _| {
+                let squared = squared_distance(at(l[0]), large[i as usize]);
+                found |= squared <= limit;
+                limit = limit.min(squared);
+                limit
+            });
+        }
+        !found
+    });
+    loops.len() < before
+}
+
+/// The squared distance of a point to a segment.
+pub(super) fn squared_distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
+    let (d, v) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let share = (v[0] * d[0] + v[1] * d[1]) / (d[0] * d[0] + d[1] * d[1]);
+    // A segment of no length has its point as the nearest one; the NaN of 0/0 ends there too.
+    let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
+    let off = [v[0] - share * d[0], v[1] - share * d[1]];
+    off[0] * off[0] + off[1] * off[1]
+}
+
 /// The points that loops still have, and the loops over them.
-fn used(points: Vec<[f64; 2]>, loops: &mut [Vec<u32>]) -> Vec<[f64; 2]> {
+pub(super) fn used(points: Vec<[f64; 2]>, loops: &mut [Vec<u32>]) -> Vec<[f64; 2]> {
     let mut wanted = vec![false; points.len()];
     for &i in loops.iter().flatten() {
         wanted[i as usize] = true;
@@ -255,7 +319,7 @@ fn tidy(p: [f64; 2]) -> [f64; 2] {
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "far below 2^32 points")]
-fn index(i: usize) -> u32 {
+pub(super) fn index(i: usize) -> u32 {
     i as u32
 }
 
@@ -338,6 +402,54 @@ fn distance_to_chord(piece: &Piece, a: f64, b: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// Joins points that more chords arrive at than leave to the nearest ones where it is the other way
+/// round, by chords no longer than `most`; the longest of these, or a place that is left over.
+///
+/// Both ends are on the boundary, so a chord's points are within half its length of it.
+fn close_gaps(points: &[[f64; 2]], chords: &mut Vec<[u32; 2]>, most: f64) -> Result<f64, [f64; 2]> {
+    /// More open ends than touching curves leave.
+    const MOST_GAPS: usize = 1000;
+    let mut balance = vec![0_i32; points.len()];
+    for &[a, b] in chords.iter() {
+        balance[a as usize] -= 1;
+        balance[b as usize] += 1;
+    }
+    let repeated = |sign: i32| {
+        let ends = balance.iter().enumerate();
+        ends.flat_map(move |(i, &n)| (0..n * sign).map(move |_| i))
+            .collect::<Vec<usize>>()
+    };
+    let (heads, tails) = (repeated(1), repeated(-1));
+    let Some(&first) = heads.first() else {
+        return Ok(0.0);
+    };
+    if heads.len() > MOST_GAPS {
+        return Err(points[first]);
+    }
+    let gap = |i: usize, j: usize| {
+        let (p, q) = (points[heads[i]], points[tails[j]]);
+        (p[0] - q[0]).hypot(p[1] - q[1])
+    };
+    let mut pairs: Vec<(f64, usize, usize)> = (0..heads.len())
+        .flat_map(|i| (0..tails.len()).map(move |j| (gap(i, j), i, j)))
+        .collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut joined = [vec![false; heads.len()], vec![false; tails.len()]];
+    let mut longest = 0.0_f64;
+    for (length, i, j) in pairs {
+        if joined[0][i] || joined[1][j] {
+            continue;
+        }
+        if length > most {
+            return Err(points[heads[i]]);
+        }
+        (joined[0][i], joined[1][j]) = (true, true);
+        longest = longest.max(length);
+        chords.push([index(heads[i]), index(tails[j])]);
+    }
+    Ok(longest)
+}
+
 /// Chains chords into loops, one corner for each wedge of the region; where that fails, a place.
 fn loops(points: &[[f64; 2]], chords: &[[u32; 2]]) -> Result<Vec<Vec<u32>>, [f64; 2]> {
     let mut leaving: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
@@ -356,22 +468,31 @@ fn loops(points: &[[f64; 2]], chords: &[[u32; 2]]) -> Result<Vec<Vec<u32>>, [f64
             _ => return Err(points[p]),
         }
     }
-    let mut used = vec![false; chords.len()];
+    let chains = chains(&next).into_iter();
+    // There and back again bounds nothing.
+    let closed = chains.filter(|chain| chain.len() > 2);
+    Ok(closed
+        .map(|chain| chain.iter().map(|&i| chords[i as usize][0]).collect())
+        .collect())
+}
+
+/// The cycles that following `next` from each chord makes.
+pub(super) fn chains(next: &[u32]) -> Vec<Vec<u32>> {
+    let mut used = vec![false; next.len()];
     let mut found = Vec::new();
-    for first in 0..chords.len() {
-        let mut corners = Vec::new();
+    for first in 0..next.len() {
+        let mut chain = Vec::new();
         let mut i = first;
         while !used[i] {
             used[i] = true;
-            corners.push(chords[i][0]);
+            chain.push(index(i));
             i = next[i] as usize;
         }
-        // There and back again bounds nothing.
-        if corners.len() > 2 {
-            found.push(corners);
+        if !chain.is_empty() {
+            found.push(chain);
         }
     }
-    Ok(found)
+    found
 }
 
 /// Pairs the chords that meet at point `p` into corners.

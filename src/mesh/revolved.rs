@@ -30,9 +30,10 @@
 //! The budget is halved between the two, which is the cheapest: the counts of chords and of
 //! steps fall with the square roots of their shares. What the chords leave goes to the steps.
 
-use super::outline::{NoOutline, Outline};
+use super::cap::Cap;
+use super::outline::{NoOutline, Outline, index};
 use super::triangles::Mesh;
-use super::{MAX_TRIANGLES, MeshError, cap};
+use super::{MAX_TRIANGLES, MeshError};
 use crate::math::{Dd, Real};
 use crate::solid::{Revolved, Turn};
 use glam::{DVec2, DVec3};
@@ -58,7 +59,7 @@ pub(super) fn tessellate(body: &Revolved, chord_error: f64) -> Result<Mesh, Mesh
             smallest,
         });
     }
-    let outline = fitted(body, budget).map_err(|reason| match reason {
+    let mut outline = fitted(body, budget).map_err(|reason| match reason {
         NoOutline::TooManyChords => MeshError::TooManyTriangles {
             found: chord_error,
             triangles: estimate(body, budget),
@@ -68,9 +69,19 @@ pub(super) fn tessellate(body: &Revolved, chord_error: f64) -> Result<Mesh, Mesh
             at: at.map(|v| v * scale),
         },
     })?;
+    let cap = match body.turn() {
+        Turn::Full => None,
+        Turn::Partial(_) => {
+            let spare = 0.5 * (budget - outline.error);
+            let cap = Cap::new(&mut outline, spare).map_err(|at| MeshError::Thin {
+                at: at.map(|v| v * scale),
+            })?;
+            Some(cap)
+        }
+    };
     let radius = outline.radius();
     let turned = steps(body.turn(), radius, budget - outline.error);
-    let caps = cap_triangles(body.turn(), &outline);
+    let caps = cap.as_ref().map_or(0, |c| 2 * c.triangles.len());
     let count = 2.0 * turned * as_f64(outline.swept()) + as_f64(caps);
     if count > as_f64(MAX_TRIANGLES) {
         return Err(MeshError::TooManyTriangles {
@@ -86,7 +97,7 @@ pub(super) fn tessellate(body: &Revolved, chord_error: f64) -> Result<Mesh, Mesh
         reason = "a count below the limit"
     )]
     let rings = Rings::new(body, &outline, turned as usize);
-    let (vertices, triangles) = rings.surface();
+    let (vertices, triangles) = rings.surface(cap.as_ref(), body);
     Ok(Mesh::new(
         vertices,
         triangles,
@@ -150,26 +161,9 @@ fn sagitta(turn: &Turn, radius: f64, n: f64) -> f64 {
     2.0 * radius * sine * sine
 }
 
-/// Triangles of both caps, at most.
-fn cap_triangles(turn: &Turn, outline: &Outline) -> usize {
-    match turn {
-        Turn::Full => 0,
-        // Each loop but the outermost joins two corners to the others twice.
-        Turn::Partial(_) => outline.loops.iter().map(|l| 2 * l.len()).sum(),
-    }
-}
-
 #[allow(clippy::cast_precision_loss, reason = "counts far below 2^53")]
 fn as_f64(count: usize) -> f64 {
     count as f64
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "fewer vertices than the limit on triangles"
-)]
-fn index(i: usize) -> u32 {
-    i as u32
 }
 
 /// The vertices that a corner of the outline becomes.
@@ -241,7 +235,8 @@ impl<'a> Rings<'a> {
         }
     }
 
-    fn surface(self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    /// All vertices and triangles, with both caps where there is one to be put at the ends.
+    fn surface(mut self, cap: Option<&Cap>, body: &Revolved) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let mut triangles = Vec::new();
         let mut first = 0;
         for corners in &self.outline.loops {
@@ -261,13 +256,21 @@ impl<'a> Rings<'a> {
             }
             first += n;
         }
-        if !self.full {
-            let cap = cap::triangles(&self.outline.points, &self.outline.loops);
-            let corner = |c: u32, k: usize| self.vertex(self.spots[c as usize][0], k);
+        for (cap, k) in cap.into_iter().flat_map(|c| [(c, 0), (c, self.steps)]) {
+            let inner = index(self.vertices.len());
+            let direction = directions(body.turn(), self.steps)[k];
+            self.vertices.extend(cap.inner.iter().map(|&p| {
+                let [r, z] = self.outline.points[p as usize];
+                let turned = DVec3::new(r * direction.x, r * direction.y, z);
+                body.frame().to_world(turned)
+            }));
+            let corner = |c: u32| match self.spots.get(c as usize) {
+                Some(spot) => self.vertex(spot[0], k),
+                None => inner + c - index(self.spots.len()),
+            };
             // Seen from before the start the half-plane's r runs to the right.
-            triangles.extend(cap.iter().map(|t| t.map(|c| corner(c, 0))));
-            let reversed = cap.iter().map(|&[a, b, c]| [a, c, b]);
-            triangles.extend(reversed.map(|t| t.map(|c| corner(c, self.steps))));
+            let turned = |[a, b, c]: [u32; 3]| if k == 0 { [a, b, c] } else { [a, c, b] };
+            triangles.extend(cap.triangles.iter().map(|&t| turned(t).map(corner)));
         }
         (self.vertices, triangles)
     }

@@ -19,7 +19,9 @@ use glam::DVec3;
 /// # Errors
 /// [`MeshError::ChordError`] when it is no such length, [`MeshError::BelowRounding`] when it is below the
 /// rounding of coordinates, [`MeshError::TooManyTriangles`] when it takes more than
-/// [`MAX_TRIANGLES`](super::MAX_TRIANGLES), [`MeshError::Open`] when the profile's boundary does not close.
+/// [`MAX_TRIANGLES`](super::MAX_TRIANGLES), [`MeshError::Open`] when the profile's boundary does not close,
+/// [`MeshError::Thin`] when its walls have no thickness in f64, [`MeshError::Torn`] when the triangles do not close:
+/// there is no mesh that does not.
 ///
 /// ```
 /// let scene = voxlathe::Scene::parse(
@@ -38,11 +40,17 @@ pub fn tessellate(body: &Body, chord_error: f64) -> Result<Mesh, MeshError> {
     if !(chord_error > 0.0 && chord_error.is_finite()) {
         return Err(MeshError::ChordError { found: chord_error });
     }
-    match body {
+    let mesh = match body {
         Body::Revolved(one) => revolved::tessellate(one, chord_error),
         Body::Ellipsoid(one) => ellipsoid(one, chord_error),
         Body::Block(one) => block(one, chord_error),
         Body::Patches(one) => patches::tessellate(one, chord_error),
+    }?;
+    match mesh.unmatched_edge() {
+        None => Ok(mesh),
+        Some([v, _]) => Err(MeshError::Torn {
+            at: mesh.vertices()[v as usize].to_array(),
+        }),
     }
 }
 

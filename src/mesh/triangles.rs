@@ -1,6 +1,7 @@
 //! Vertices and triangles.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A closed triangle mesh, oriented outward.
 ///
@@ -84,7 +85,7 @@ impl Mesh {
             .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
             .map(|[a, b]| (a.min(b), a.max(b), a < b))
             .collect();
-        edges.sort_unstable();
+        edges.par_sort_unstable();
         let wrong = edges
             .chunk_by(|p, q| (p.0, p.1) == (q.0, q.1))
             .find(|uses| uses.len() != 2 || uses[0].2 == uses[1].2 || uses[0].0 == uses[0].1);
