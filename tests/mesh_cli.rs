@@ -314,6 +314,75 @@ fn what_cannot_be_is_refused_with_the_code_for_it() {
     assert!(names_in(folder.path()).is_empty());
 }
 
+/// Curves that touch from within, and the axis: meshed, and validated.
+#[test]
+fn touching_curves_are_meshed_and_validated() {
+    let bore = "loops = [[{ kind = 'circle', center = [3, 0], radius = 1 }], \
+                [{ kind = 'circle', center = [3.6, 0], radius = 0.4 }]]";
+    let cusp = "boundary = 'to-axis'\ncurves = [{ kind = 'nurbs', points = [[0, 0], [0, 2], [1, 3]], degree = 2 }]";
+    let folder = scratch();
+    // 2 pi^2 (R a^2 - (R + a - b) b^2), and pi times the integral of t^4 (4 - 2 t).
+    let whole = 2.0 * PI * PI * (3.0 - 3.6 * 0.16);
+    for (profile, angle, exact) in [
+        (bore, 360.0, whole),
+        (bore, 90.0, whole / 4.0),
+        (bore, 270.0, whole * 0.75),
+        (cusp, 180.0, PI / 2.0 * (0.8 - 1.0 / 3.0)),
+        (cusp, 360.0, PI * (0.8 - 1.0 / 3.0)),
+    ] {
+        let text = format!(
+            "schema = 1\ngrid = {{ resolution = 16 }}\n[profiles.p]\n{profile}\n[[solid]]\n\
+             kind = 'revolve'\nprofile = 'p'\nangle = {angle}\n"
+        );
+        let (scene, file) = (below(&folder, "s.toml"), below(&folder, "m.ply"));
+        fs::write(&scene, text).expect("a scene");
+        let made = run(&[
+            "mesh",
+            &scene,
+            "-o",
+            &file,
+            "--chord-error",
+            "0.01",
+            "--json",
+        ]);
+        let made = made.exits(0).json();
+        let found = read_ply(&file);
+        assert_closed(&found);
+        let off = (volume(&found) - exact).abs();
+        assert!(off < 0.03 * exact, "{profile} {angle}: off by {off}");
+        // No more than the curves take: what touches leaves no crumbs.
+        assert!(made["files"][0]["triangles"].as_u64() < Some(20_000));
+        let checked = run(&["validate", &scene, "--json"]).exits(0).json();
+        assert_eq!(checked["ok"], true);
+    }
+}
+
+/// The chord error is named as the user's where it is, else how it came about.
+#[test]
+fn a_refused_chord_error_names_what_was_given() {
+    let folder = scratch();
+    let scene = below(&folder, "s.toml");
+    let text = "schema = 1\ngrid = { spacing = 1e-9, origin = [0, 0, 0], dims = [4, 4, 4] }\n\
+                [[solid]]\nkind = 'torus'\nmajor = 2\nminor = 1\n";
+    fs::write(&scene, text).expect("a scene");
+    for command in ["mesh", "validate"] {
+        let file = below(&folder, if command == "mesh" { "m.ply" } else { "m.html" });
+        let plain = run(&[command, &scene, "-o", &file]).exits(2).err;
+        assert!(!plain.contains("--chord-error: "), "{plain}");
+        assert!(
+            plain.contains("a tenth of the smallest side of a voxel"),
+            "{plain}"
+        );
+        let flag = run(&[command, &scene, "-o", &file, "--chord-error", "1e-10"])
+            .exits(2)
+            .err;
+        assert!(
+            flag.contains("--chord-error: solid") && !flag.contains("tenth"),
+            "{flag}"
+        );
+    }
+}
+
 #[test]
 fn equal_runs_give_equal_bytes_for_any_number_of_threads() {
     let folder = scratch();

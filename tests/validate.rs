@@ -177,3 +177,31 @@ fn a_wrong_scale_is_found() {
     let report = run(&scene, &grid, &meshes, Points::Grid);
     assert!(report.disagree > 0 && report.field.distance[1] > 0);
 }
+
+/// Where f32 holds no number of the distances' size, the distances themselves are looked at.
+#[test]
+fn beyond_single_precision_nothing_is_reported() {
+    for scale in [
+        "1e45", "1e39", "1e38", "1e37", "1e-37", "1e-39", "1e-45", "1e-60",
+    ] {
+        let text = format!(
+            "schema = 1\ngrid = {{ resolution = 12 }}\n[[solid]]\nkind = 'torus'\nmajor = 1\n\
+             minor = 0.35\nangle = 180\nplace = [{{ scale = {scale} }}]\n"
+        );
+        let scene = Scene::parse(&text).expect("a scene");
+        let grid = scene.grid().expect("a grid");
+        for points in [Points::Grid, Points::Random(500)] {
+            let report = check(&scene, &grid, 0.1, points);
+            adds_up(&report);
+            assert!(report.is_ok(), "{scale}: {report:#?}");
+            assert!(report.field.gradient_max_error < 0.05, "{scale}");
+        }
+        // What is wrong is seen there as well.
+        let there = text.replace("minor = 0.35", "minor = 0.45");
+        let there = Scene::parse(&there).expect("a scene");
+        let chord_error = 0.1 * grid.spacing().min_element();
+        let other = meshes(&there, chord_error).expect("meshes");
+        let report = run(&scene, &grid, &other, Points::Grid);
+        assert!(report.field.distance[1] > 0, "{scale}: {report:#?}");
+    }
+}

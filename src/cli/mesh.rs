@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::interrupt;
 use super::output::{Console, NOTHING_LEFT};
 use crate::io::mesh::{check_mesh_name, write_mesh};
-use crate::mesh::{Mesh, tessellate};
+use crate::mesh::{Mesh, MeshError, tessellate};
 use crate::scene::Scene;
 use crate::solid::Body;
 use rayon::prelude::*;
@@ -39,13 +39,13 @@ pub(super) fn run(
         Some(given) => given,
         None => DEFAULT_SHARE * scene.grid()?.spacing().min_element(),
     };
+    let refused = |solid: &str, e: &MeshError| no_mesh(solid, e, arguments.chord_error);
     let jobs = jobs(&scene, arguments)?;
     let made = jobs
         .par_iter()
         .map(|job| {
             interrupt::check()?;
-            tessellate(job.body, chord_error)
-                .map_err(|e| Failure::usage(format!("solid {:?}: {e}", job.solid)))
+            tessellate(job.body, chord_error).map_err(|e| refused(job.solid, &e))
         })
         .collect::<Result<Vec<Mesh>, Failure>>()?;
     let units = scene.model().units.name();
@@ -82,6 +82,19 @@ pub(super) fn run(
     });
     console.result(&document, &text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Why a solid has no mesh, in terms of what the user gave: the flag where there was one, else how the
+/// chord error came about where it is the reason.
+pub(super) fn no_mesh(solid: &str, error: &MeshError, given: Option<f64>) -> Failure {
+    let of_chord_error = !matches!(error, MeshError::Open { .. } | MeshError::Thin { .. });
+    Failure::usage(match given {
+        Some(_) if of_chord_error => format!("--chord-error: solid {solid:?}: {error}"),
+        None if of_chord_error => format!(
+            "solid {solid:?}: {error}; without --chord-error it is a tenth of the smallest side of a voxel"
+        ),
+        _ => format!("solid {solid:?}: {error}"),
+    })
 }
 
 /// What is to be meshed: each solid's own body, or the one body that the scene is.

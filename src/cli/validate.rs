@@ -3,7 +3,7 @@
 use super::arguments::{Common, Validate};
 use super::failure::Failure;
 use super::interrupt;
-use super::mesh::DEFAULT_SHARE;
+use super::mesh::{DEFAULT_SHARE, no_mesh};
 use super::output::Console;
 use crate::grid::GridSpec;
 use crate::io::write_file_atomically;
@@ -39,7 +39,7 @@ pub(super) fn run(
         .chord_error
         .unwrap_or(DEFAULT_SHARE * grid.spacing().min_element());
     let meshes = meshes(&scene, chord_error)
-        .map_err(|(name, e)| Failure::usage(format!("--chord-error: solid {name:?}: {e}")))?;
+        .map_err(|(name, e)| no_mesh(&name, &e, arguments.chord_error))?;
     let (points, count) = match arguments.samples {
         Some(n) => (Points::Random(n), n),
         None => (Points::Grid, grid.voxel_count()),

@@ -2,12 +2,16 @@
 //!
 //! ```text
 //!   sign       φ <= 0 where the point is inside, and there alone
-//!   steepness  |φ(p) - φ(q)| <= |p - q|, neighbours p and q, and two ulp of each for storing them
+//!   steepness  |φ(p) - φ(q)| <= |p - q|, neighbours p and q, and what each may be off by
 //!   slope      ||∇φ| - 1| <= (Σ s²)^½ / 2, s the change of slope along each axis within the stencil
 //!   zero       where the sign changes the triangles are near: within the chord error and what a
 //!              slope of 1 leaves of linear interpolation
 //!   distance   of a single solid within the chord error of the distance to its triangles
 //! ```
+//!
+//! A stored value may be off by two ulp of f32, and by 8 ε (size + |p|): an answer is that about a point
+//! as f64 has it. Where f32 has no number of the value's size, above its largest or below its smallest
+//! normal one, what is stored must be that limit, and the checks look at the distance itself.
 //!
 //! The slope along an axis at the middle of three points lies between those on both sides, unless
 //! something thinner than the stencil hides between them: where the check fails, the exact distance
@@ -107,18 +111,56 @@ pub(super) struct Stencil {
     pub(super) beside: [[Option<f32>; 2]; 3],
 }
 
+/// The values of a stencil as numbers that f64 keeps.
+struct Near {
+    value: f64,
+    beside: [[Option<f64>; 2]; 3],
+}
+
+impl Near {
+    fn new(field: &Field, s: &Stencil) -> Self {
+        let kept = |value: f32, point: DVec3| {
+            if is_kept(value) {
+                f64::from(value)
+            } else {
+                field.assembly.signed_distance(point)
+            }
+        };
+        let mut beside = [[None; 2]; 3];
+        for (axis, pair) in beside.iter_mut().enumerate() {
+            let step = DVec3::AXES[axis] * field.spacing[axis];
+            let [below, above] = s.beside[axis];
+            *pair = [
+                below.map(|v| kept(v, s.point - step)),
+                above.map(|v| kept(v, s.point + step)),
+            ];
+        }
+        Self {
+            value: kept(s.value, s.point),
+            beside,
+        }
+    }
+}
+
 /// The checks.
 pub(super) struct Field<'a> {
     assembly: &'a Assembly,
     meshes: &'a [PartMesh],
     spacing: DVec3,
+    /// Longest side of the bounds.
+    size: f64,
     /// Whether stored distances are those of one solid.
     single: bool,
 }
 
 /// What storing a value may change it by, twice over.
-fn rounding(value: f32) -> f64 {
-    2.0 * f64::from(f32::EPSILON) * f64::from(value.abs()) + f64::from(f32::MIN_POSITIVE)
+fn rounding(value: f64) -> f64 {
+    2.0 * f64::from(f32::EPSILON) * value.abs()
+}
+
+/// Whether f32 has numbers next to each other of a stored value's size.
+fn is_kept(value: f32) -> bool {
+    value.is_normal() && value.abs() < f32::MAX
 }
 
 impl<'a> Field<'a> {
@@ -127,6 +169,7 @@ impl<'a> Field<'a> {
             assembly,
             meshes,
             spacing: grid.spacing(),
+            size: assembly.bounds().longest_side(),
             single: assembly.parts().len() == 1,
         }
     }
@@ -166,15 +209,25 @@ impl<'a> Field<'a> {
             checks.wrong_sign += 1;
             fail(checks, "sign", [f64::from(s.value), 0.0]);
         }
-        let here = f64::from(s.value);
+        let near = Near::new(self, s);
+        let here = near.value;
+        if !is_kept(s.value) {
+            let off = (f64::from(s.value) - f64::from(stored(here))).abs();
+            // Two of the smallest numbers there are.
+            let allowed = f64::from(f32::from_bits(2)) + self.doubt(s.point);
+            checks.distance[0] += 1;
+            if off > allowed {
+                checks.distance[1] += 1;
+                fail(checks, "distance", [off, allowed]);
+            }
+        }
         for axis in 0..3 {
-            let Some(next) = s.beside[axis][1].filter(|v| v.is_finite()) else {
+            let Some(there) = near.beside[axis][1].filter(|v| v.is_finite()) else {
                 continue;
             };
-            let there = f64::from(next);
             // The step between centres as they are in f64.
             let step = self.spacing[axis] + 4.0 * f64::EPSILON * s.point[axis].abs();
-            let allowed = step + rounding(s.value) + rounding(next);
+            let allowed = step + rounding(here) + rounding(there) + 2.0 * self.doubt(s.point);
             checks.steepness[0] += 1;
             let off = (there - here).abs();
             if off > allowed {
@@ -190,11 +243,16 @@ impl<'a> Field<'a> {
                 }
             }
         }
-        if let Some([off, allowed]) = self.slope(s, checks) {
+        if let Some([off, allowed]) = self.slope(s, &near, checks) {
             checks.slope[1] += 1;
             fail(checks, "slope", [off, allowed]);
         }
-        self.distances(s, checks);
+        self.distances(s, here, checks);
+    }
+
+    /// What a distance may be off by: that of a point as near as f64 has it.
+    fn doubt(&self, point: DVec3) -> f64 {
+        8.0 * f64::EPSILON * (self.size + point.length())
     }
 
     /// How far the triangles are from where the sign changes, and how far they may be.
@@ -205,8 +263,7 @@ impl<'a> Field<'a> {
         let at = point + DVec3::AXES[axis] * (step * (a / sum));
         // |φ| there is at most what is left of a slope of 1 from either end.
         let left = a.max(b) * (step / sum - 1.0).max(0.0);
-        let stored = rounding(stored(a)) + rounding(stored(b));
-        let room = 16.0 * f64::EPSILON * point.abs().max_element() + 2.0 * stored;
+        let room = 2.0 * (rounding(a) + rounding(b) + self.doubt(point));
         let mut nearest = f64::INFINITY;
         let mut chord = 0.0_f64;
         for m in self.meshes {
@@ -218,22 +275,21 @@ impl<'a> Field<'a> {
     }
 
     /// The error of the slope and what it may be, where that fails.
-    fn slope(&self, s: &Stencil, checks: &mut FieldChecks) -> Option<[f64; 2]> {
-        let here = f64::from(s.value);
+    fn slope(&self, s: &Stencil, near: &Near, checks: &mut FieldChecks) -> Option<[f64; 2]> {
+        let here = near.value;
         let (mut gradient, mut changes, mut noise) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         for axis in 0..3 {
-            let [Some(below), Some(above)] = s.beside[axis] else {
+            let [Some(low), Some(high)] = near.beside[axis] else {
                 return None;
             };
             let step = self.spacing[axis];
-            let (low, high) = (f64::from(below), f64::from(above));
             gradient[axis] = (high - low) / (2.0 * step);
             changes[axis] = (high + low - 2.0 * here) / step;
-            noise += (rounding(below) + rounding(above) + 2.0 * rounding(s.value)) / step;
+            let off = rounding(low) + rounding(high) + 2.0 * rounding(here);
+            noise += (off + 4.0 * self.doubt(s.point)) / step;
         }
-        // An empty composite is infinitely far, as far as f32 goes.
-        let infinite = |v: f64| v.abs() >= f64::from(f32::MAX);
-        if infinite(here) || !gradient.is_finite() {
+        // An empty composite is infinitely far.
+        if !here.is_finite() || !gradient.is_finite() {
             return None;
         }
         let error = (gradient.length() - 1.0).abs();
@@ -247,7 +303,7 @@ impl<'a> Field<'a> {
             return None;
         }
         if error > allowed {
-            return (!self.has_slope_one(s)).then_some([error, allowed]);
+            return (!self.has_slope_one(s, here)).then_some([error, allowed]);
         }
         if worse {
             checks.gradient_max_error = error;
@@ -267,7 +323,7 @@ impl<'a> Field<'a> {
     }
 
     /// Whether the exact distance has slope 1 at the stencil's middle, and is what is stored there.
-    fn has_slope_one(&self, s: &Stencil) -> bool {
+    fn has_slope_one(&self, s: &Stencil, value: f64) -> bool {
         let here = self.assembly.signed_distance(s.point);
         let step = 1e-3 * self.spacing.min_element();
         let slope = |axis: usize| {
@@ -277,17 +333,17 @@ impl<'a> Field<'a> {
             (above - below) / (2.0 * step)
         };
         let length = DVec3::new(slope(0), slope(1), slope(2)).length();
-        let same = (f64::from(s.value) - here).abs() <= rounding(s.value);
+        let same = (value - here).abs() <= rounding(value) + self.doubt(s.point);
         // On the medial axis itself the slopes of both sides cancel.
-        same && length <= 1.0 + 1e-3
+        same && length <= 1.0 + 1e-3 + 2.0 * self.doubt(s.point) / step
     }
 
     /// Each solid's distance against that of its triangles.
-    fn distances(&self, s: &Stencil, checks: &mut FieldChecks) {
+    fn distances(&self, s: &Stencil, value: f64, checks: &mut FieldChecks) {
         for (part, m) in self.assembly.parts().iter().zip(self.meshes) {
             let inside = part.contains(s.point);
             let exact = if self.single {
-                f64::from(s.value.abs())
+                value.abs()
             } else {
                 part.body().distance(s.point, inside, f64::INFINITY)
             };
@@ -298,7 +354,7 @@ impl<'a> Field<'a> {
             let reach = exact + s.point.abs().max_element();
             let mut allowed = m.mesh.chord_error() + 64.0 * f64::EPSILON * reach;
             if self.single {
-                allowed += rounding(s.value);
+                allowed += rounding(value);
             }
             checks.distance[0] += 1;
             checks.distance_max_error = checks.distance_max_error.max(off);
