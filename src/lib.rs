@@ -116,6 +116,7 @@ pub mod sample;
 pub mod scene;
 pub mod solid;
 pub mod validate;
+mod work;
 
 pub use error::Error;
 pub use scene::Scene;

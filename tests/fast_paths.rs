@@ -468,8 +468,8 @@ fn distances_of_composites_are_as_certain_as_the_exact_ones() {
         for grid in grids(&scene) {
             let spacing = grid.spacing();
             for band in [None, Some(2.5 * spacing.max_element())] {
-                let sampler = || LayerSampler::new(scene.assembly(), &grid, selection(band));
-                let (quick, exact) = (sampler(), sampler().with_exact_distances());
+                let quick = LayerSampler::new(scene.assembly(), &grid, selection(band));
+                let exact = LayerSampler::exact(scene.assembly(), &grid, selection(band));
                 let [mut a, mut b] = [LayerBuffers::default(), LayerBuffers::default()];
                 for k in 0..grid.dims()[2] {
                     quick.sample(k, &mut a);

@@ -151,7 +151,7 @@ pub(super) struct Voxelize {
     /// Clamp distances to this many voxels on both sides of the surface
     #[arg(long, value_name = "VOXELS", allow_negative_numbers = true)]
     pub(super) band: Option<f64>,
-    /// Most memory to use for layers, as 512MiB, 2G or bytes; half of the machine's without it
+    /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(super) memory_limit: Option<u64>,
     /// Replace the stack in DIR: exactly the files its manifest lists, and stale slices
@@ -258,6 +258,9 @@ pub(super) struct Validate {
     /// grid spacing without it
     #[arg(long, value_name = "E", allow_negative_numbers = true)]
     pub(super) chord_error: Option<f64>,
+    /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(super) memory_limit: Option<u64>,
     /// Page to write the report to, .html
     #[arg(long, short, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
@@ -286,6 +289,9 @@ pub(super) struct Converge {
     /// Moved grids that the error by occupancy is averaged over
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=4096))]
     pub(super) offsets: u32,
+    /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(super) memory_limit: Option<u64>,
     /// Directory for converge.csv and converge.png
     #[arg(long, short, value_name = "DIR")]
     pub(super) output: Option<PathBuf>,

@@ -3,8 +3,9 @@
 use super::arguments::{Common, Converge};
 use super::failure::Failure;
 use super::interrupt;
-use super::output::Console;
-use crate::converge::{Plan, Row, Study, study};
+use super::memory::{Budget, Need};
+use super::output::{self, Console};
+use crate::converge::{Plan, Row, Study, bytes_per_worker, study_with};
 use crate::io::{IoError, StackDirectory};
 use crate::scene::Scene;
 use serde_json::{Value, json};
@@ -13,6 +14,8 @@ use std::process::ExitCode;
 
 const TABLE: &str = "converge.csv";
 const PLOT: &str = "converge.png";
+/// What drawing and compressing the plot takes.
+const PLOT_BYTES: u64 = 12 << 20;
 
 pub(super) fn run(
     arguments: &Converge,
@@ -33,8 +36,18 @@ pub(super) fn run(
         resolutions: arguments.resolutions.clone(),
         offsets: arguments.offsets,
     };
+    let need = Need {
+        what: "the process with a layer of the finest grid at a time",
+        fixed: PLOT_BYTES,
+        each: bytes_per_worker(&scene, &plan)?,
+        remedy: "lower the highest of --resolutions",
+    };
+    let budget = Budget::new(arguments.memory_limit);
+    let workers = budget.workers(&need, rayon::current_num_threads())?;
     let bar = console.bar(plan.resolutions.len() as u64, "resolutions");
-    let found = study(&scene, &plan, &interrupt::check, &mut |_| bar.inc(1))?;
+    let found = study_with(workers, &scene, &plan, &interrupt::check, &mut |_| {
+        bar.inc(1)
+    })?;
     bar.finish_and_clear();
     let mut files = Vec::new();
     if let Some(writer) = writer {
@@ -56,7 +69,7 @@ pub(super) fn run(
         "offsets": plan.offsets,
         "rows": found.rows.iter().map(entry).collect::<Vec<_>>(),
         "orders": orders(&found),
-        "files": files,
+        "files": files.iter().map(|f| output::path(f)).collect::<Vec<_>>(),
         "warnings": scene.warnings(),
     });
     console.result(&document, &table(&found, scene.model().units.name()))?;

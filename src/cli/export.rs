@@ -3,7 +3,7 @@
 use super::arguments::{Common, Export};
 use super::failure::Failure;
 use super::interrupt;
-use super::output::Console;
+use super::output::{self, Console};
 use crate::error::Error;
 use crate::exchange::{ExchangeError, Format, write_volumes};
 use crate::nurbs::NurbsVolume;
@@ -73,7 +73,7 @@ pub(super) fn run(
         patches.push(json!({ "solid": name, "degrees": degrees, "counts": counts }));
     }
     let document = json!({
-        "file": arguments.output,
+        "file": output::path(&arguments.output),
         "format": name_of(format),
         "scene": scene.name(),
         "units": scene.model().units.name(),

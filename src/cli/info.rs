@@ -21,7 +21,7 @@ pub(super) fn run(
     let total: u64 = m.files.iter().map(|f| f.bytes).sum();
     let altered: Vec<&str> = report.altered.iter().map(|a| a.name.as_str()).collect();
     let document = json!({
-        "directory": arguments.directory,
+        "directory": output::path(&arguments.directory),
         "scene": m.scene_name,
         "scene_hash": m.scene_hash,
         "version": m.version,

@@ -3,7 +3,7 @@
 use super::arguments::{Common, Mesh as Arguments};
 use super::failure::Failure;
 use super::interrupt;
-use super::output::{Console, NOTHING_LEFT};
+use super::output::{self, Console, NOTHING_LEFT};
 use crate::io::mesh::{check_mesh_name, write_mesh};
 use crate::mesh::{Mesh, MeshError, tessellate};
 use crate::scene::Scene;
@@ -66,7 +66,7 @@ pub(super) fn run(
             mesh.chord_error(),
         );
         files.push(json!({
-            "file": job.file,
+            "file": output::path(&job.file),
             "solid": job.solid,
             "triangles": mesh.triangles().len(),
             "vertices": mesh.vertices().len(),

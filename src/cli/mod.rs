@@ -11,6 +11,7 @@ mod generate;
 mod info;
 mod interrupt;
 mod measure;
+mod memory;
 mod mesh;
 mod output;
 mod query;

@@ -5,6 +5,7 @@ use super::failure::Failure;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::borrow::Cow;
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What is said of an empty composite.
@@ -131,6 +132,11 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::output(&e)),
         _ => Ok(()),
     }
+}
+
+/// A path in a document: JSON is Unicode, so that of a path which is not is replaced by U+FFFD.
+pub(super) fn path(path: &Path) -> Cow<'_, str> {
+    path.to_string_lossy()
 }
 
 /// Bytes as a person reads them.

@@ -87,7 +87,7 @@ pub(super) fn run(
             "units": scene.model().units.name(),
             "columns": names,
             "rows": rows,
-            "file": arguments.output,
+            "file": arguments.output.as_deref().map(output::path),
             "warnings": scene.warnings(),
         });
         console.result(&document, "")?;

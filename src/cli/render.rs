@@ -91,7 +91,7 @@ pub(super) fn run(
     let seconds = start.elapsed().as_secs_f64();
     let (width, height) = (picture.width(), picture.height());
     let document = json!({
-        "file": arguments.output,
+        "file": output::path(&arguments.output),
         "kind": if plane.is_some() { "slice" } else { "shaded" },
         "width": width,
         "height": height,

@@ -3,12 +3,13 @@
 use super::arguments::{Common, Validate};
 use super::failure::Failure;
 use super::interrupt;
+use super::memory::{Budget, Need};
 use super::mesh::{DEFAULT_SHARE, no_mesh};
 use super::output::Console;
 use crate::grid::GridSpec;
 use crate::io::write_file_atomically;
 use crate::scene::Scene;
-use crate::validate::{Heading, Points, Report, meshes, page, validate};
+use crate::validate::{Heading, Points, Report, bytes_per_worker, meshes, page, validate_with};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::process::ExitCode;
@@ -38,16 +39,27 @@ pub(super) fn run(
     let chord_error = arguments
         .chord_error
         .unwrap_or(DEFAULT_SHARE * grid.spacing().min_element());
-    let meshes = meshes(&scene, chord_error)
-        .map_err(|(name, e)| no_mesh(&name, &e, arguments.chord_error))?;
     let (points, count) = match arguments.samples {
         Some(n) => (Points::Random(n), n),
         None => (Points::Grid, grid.voxel_count()),
     };
+    let budget = Budget::new(arguments.memory_limit);
+    let need = Need {
+        what: "the process with its triangles and some layers of voxels at a time",
+        fixed: 0,
+        each: bytes_per_worker(&scene, &grid, points),
+        remedy: "lower the resolution, or give a larger --chord-error",
+    };
+    let threads = rayon::current_num_threads();
+    budget.workers(&need, threads)?;
+    let meshes = meshes(&scene, chord_error)
+        .map_err(|(name, e)| no_mesh(&name, &e, arguments.chord_error))?;
+    // With the triangles it may be too much after all.
+    let workers = budget.workers(&need, threads)?;
     let bar = console.bar(count, "points");
-    let report = validate(&scene, &grid, &meshes, points, &interrupt::check, &|n| {
-        bar.inc(n)
-    })?;
+    let done = |n| bar.inc(n);
+    let stop = &interrupt::check;
+    let report = validate_with(workers, &scene, &grid, &meshes, points, stop, &done)?;
     bar.finish_and_clear();
     if let Some(path) = &arguments.output {
         let hash = scene.hash();
@@ -223,7 +235,7 @@ fn text(report: &Report, units: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::PartMesh;
+    use crate::validate::{PartMesh, validate};
     use glam::DVec3;
 
     /// The triangles of one scene against the exact answers of another.

@@ -3,6 +3,7 @@
 use super::arguments::{Common, Voxelize};
 use super::failure::Failure;
 use super::interrupt;
+use super::memory::{self, Budget, Need};
 use super::output::{self, Console, NOTHING_LEFT};
 use crate::error::Error;
 use crate::grid::GridSpec;
@@ -34,9 +35,12 @@ struct Plan {
     scalars: Vec<Scalar>,
     channels: Vec<ChannelSpec>,
     compression: Compression,
-    workers: usize,
-    memory_limit: u64,
+    budget: Budget,
+    /// Bytes that the records of all layers, and the previews, take.
+    fixed_bytes: u64,
+    /// Bytes of a worker.
     layer_bytes: u64,
+    workers: usize,
     stack_bytes: u64,
 }
 
@@ -61,7 +65,16 @@ pub(super) fn run(
     for warning in scene.warnings() {
         console.warn(warning);
     }
-    let plan = plan(&scene, arguments, common.kernel()?)?;
+    let mut plan = plan(&scene, arguments, common.kernel()?)?;
+    let interrupted = || interrupt::check().is_err();
+    let grid = plan.grid;
+    let sampler = LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection)
+        .with_scalars(plan.scalars.clone())
+        .with_cancel(&interrupted);
+    interrupt::check()?;
+    // The tables are there: what is missing is known.
+    plan.layer_bytes = (plan.layer_bytes).saturating_add(sampler.bytes_per_thread());
+    plan.workers = plan.room()?;
     let prepare = start.elapsed().as_secs_f64();
     tracing::debug!(dims = ?plan.grid.dims(), workers = plan.workers, layer_bytes = plan.layer_bytes, "planned");
     if arguments.dry_run {
@@ -82,7 +95,7 @@ pub(super) fn run(
         plan.channels.clone(),
         options,
     )?;
-    let (sample, write, tally) = stream(&scene, &plan, &writer, console)?;
+    let (sample, write, tally) = stream(&sampler, &plan, &writer, console)?;
     let drawn = Instant::now();
     if arguments.preview {
         preview(&scene, &plan, &writer)?;
@@ -218,41 +231,56 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
     let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
     let sampled = LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection);
     let layer_bytes = layer_bytes(&grid, sampled, &channels, scalars.len(), compression);
-    let limit = arguments.memory_limit.unwrap_or_else(default_memory_limit);
-    if layer_bytes > limit {
-        let [nx, ny, _] = grid.dims();
-        return Err(Error::TooLarge {
-            what: format!("a layer of {nx} x {ny} voxels"),
-            needed: layer_bytes,
-            available: limit,
-            remedy: "lower the resolution, choose fewer channels or raise --memory-limit".into(),
-        }
-        .into());
-    }
-    let workers = workers_within(limit, layer_bytes);
     let stack_bytes = largest_stack_bytes(&grid, &channels);
-    check_disk(arguments, compression, stack_bytes)?;
-    Ok(Plan {
+    let plan = Plan {
         grid,
         selection,
         kernel,
         scalars,
         channels,
         compression,
-        workers,
-        memory_limit: limit,
+        budget: Budget::new(arguments.memory_limit),
+        fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview),
         layer_bytes,
+        workers: 1,
         stack_bytes,
-    })
+    };
+    // What is too large without its tables is not worth making them.
+    plan.room()?;
+    check_disk(arguments, compression, stack_bytes)?;
+    Ok(plan)
 }
 
-/// Workers that so much memory has room for, one at least.
-#[allow(
-    clippy::cast_possible_truncation,
-    reason = "not more than the number of threads"
-)]
-fn workers_within(memory: u64, layer_bytes: u64) -> usize {
-    (memory / layer_bytes.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize
+impl Plan {
+    /// Workers that the limit on memory has room for.
+    fn room(&self) -> Result<usize, Error> {
+        let [nx, ny, _] = self.grid.dims();
+        let need = Need {
+            what: &format!("the process with a layer of {nx} x {ny} voxels at a time"),
+            fixed: self.fixed_bytes,
+            each: self.layer_bytes,
+            remedy: "lower the resolution or choose fewer channels",
+        };
+        (self.budget).workers(&need, rayon::current_num_threads())
+    }
+
+    /// Bytes that the layers under way and what is kept of all of them take.
+    fn memory_bytes(&self) -> u64 {
+        let layers = self.layer_bytes.saturating_mul(self.workers as u64);
+        layers.saturating_add(self.fixed_bytes)
+    }
+}
+
+/// Bytes of what is kept of each layer until the manifest is written, and of what draws the previews.
+fn fixed_bytes(grid: &GridSpec, channels: usize, preview: bool) -> u64 {
+    /// Name, digest and place of a file: in memory, in the manifest's text and in the document.
+    const RECORD: u64 = 1536;
+    /// Range and sums of a channel.
+    const STATISTICS: u64 = 96;
+    const PREVIEW: u64 = 48 << 20;
+    let record = RECORD + STATISTICS * channels as u64;
+    let records = (grid.dims()[2] as u64).saturating_mul(record);
+    records.saturating_add(if preview { PREVIEW } else { 0 })
 }
 
 /// Memory that a worker takes: the samples of one layer, `sampled` bytes but for scalars, their EXR form and what makes
@@ -300,19 +328,6 @@ fn kind(model: &ChannelModel) -> SampleKind {
         ChannelModel::Known(ChannelName::Material) => SampleKind::Uint,
         _ => SampleKind::Float,
     }
-}
-
-/// Half of the machine's memory, or 2 GiB where it does not tell.
-fn default_memory_limit() -> u64 {
-    let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
-    let total = text.lines().find_map(|l| {
-        l.strip_prefix("MemTotal:")?
-            .trim()
-            .strip_suffix(" kB")?
-            .parse::<u64>()
-            .ok()
-    });
-    total.map_or(2 << 30, |kib| kib * 1024 / 2)
 }
 
 /// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand:
@@ -374,22 +389,12 @@ fn check_f32_range(scene: &Scene, grid: &GridSpec) -> Result<(), Error> {
 /// While one worker samples another encodes, and the writer's own threads wait for the disk, so the
 /// three overlap without a queue of layers in memory.
 fn stream(
-    scene: &Scene,
+    sampler: &LayerSampler<'_>,
     plan: &Plan,
     writer: &StackWriter,
     console: &Console,
 ) -> Result<(f64, f64, Tally), Failure> {
-    let interrupted = || interrupt::check().is_err();
-    let mut sampler =
-        LayerSampler::with_kernel(plan.kernel, scene.assembly(), &plan.grid, plan.selection)
-            .with_scalars(plan.scalars.clone())
-            .with_cancel(&interrupted);
-    let per_worker = |s: &LayerSampler<'_>| plan.layer_bytes.saturating_add(s.bytes_per_thread());
-    if sampler.shared_bytes().saturating_add(per_worker(&sampler)) > plan.memory_limit {
-        sampler = sampler.with_exact_distances();
-    }
-    let left = plan.memory_limit.saturating_sub(sampler.shared_bytes());
-    let workers = (plan.workers).min(workers_within(left, per_worker(&sampler)));
+    let workers = plan.workers;
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
@@ -603,13 +608,13 @@ fn document(
         "files": manifest.map(|m| m.files.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()),
         "bytes": manifest.map(|m| m.files.iter().map(|f| f.bytes).sum::<u64>()),
         "bytes_uncompressed": plan.stack_bytes,
-        "memory_bytes": plan.layer_bytes * plan.workers as u64,
+        "memory_bytes": plan.memory_bytes(),
         "voxels_inside": manifest.and_then(|m| m.voxels_inside),
         "volume_occupancy": manifest.and_then(|m| m.volume_occupancy),
         "volume_fraction": manifest.and_then(|m| m.volume_fraction),
         "volume_exact": scene.exact_volume(),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
-        "peak_memory_bytes": peak_memory(),
+        "peak_memory_bytes": memory::peak(),
         "warnings": warnings(scene),
     })
 }
@@ -635,7 +640,7 @@ fn dry_run(
         names.join(", "),
         arguments.output.display(),
         output::bytes(plan.stack_bytes),
-        output::bytes(plan.layer_bytes * plan.workers as u64),
+        output::bytes(plan.memory_bytes()),
         plan.workers,
     );
     console.result(&document(scene, plan, None, Some(&seconds)), &text)?;
@@ -668,17 +673,4 @@ fn report(scene: &Scene, arguments: &Voxelize, manifest: &Manifest, seconds: &Se
         seconds.total, seconds.sample, seconds.write
     );
     text
-}
-
-/// The process's largest resident size, where the system tells.
-fn peak_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let kib: u64 = text
-        .lines()
-        .find_map(|l| l.strip_prefix("VmHWM:"))?
-        .trim()
-        .strip_suffix(" kB")?
-        .parse()
-        .ok()?;
-    Some(kib * 1024)
 }

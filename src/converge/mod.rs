@@ -16,9 +16,9 @@ pub use fit::order;
 use crate::grid::GridSpec;
 use crate::sample::{LayerBuffers, LayerSampler, Selection};
 use crate::scene::{GridStep, Scene};
+use crate::work::in_parts;
 use crate::{Error, sample};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// What a fraction may be off by, where a surface passes through its voxel.
 pub const FRACTION_BOUND: f64 = 1e-6;
@@ -89,6 +89,46 @@ pub fn study(
     stop: &(dyn Fn() -> Result<(), Error> + Sync),
     done: &mut dyn FnMut(&Row),
 ) -> Result<Study, Error> {
+    study_with(rayon::current_num_threads(), scene, plan, stop, done)
+}
+
+/// Bytes that a worker of [`study_with`] takes.
+///
+/// # Errors
+/// [`Error`] when a grid cannot be.
+pub fn bytes_per_worker(scene: &Scene, plan: &Plan) -> Result<u64, Error> {
+    let mut most = 0;
+    for &resolution in &plan.resolutions {
+        let grid = at(scene, resolution).grid()?;
+        let each = LayerSampler::bytes_per_layer(scene.assembly(), &grid, &studied());
+        most = each.max(most);
+    }
+    Ok(most)
+}
+
+/// A scene at a resolution.
+fn at(scene: &Scene, resolution: u32) -> Scene {
+    let mut finer = scene.clone();
+    finer.model_mut().0.step = GridStep::Resolution(resolution);
+    finer
+}
+
+/// What is studied of each layer.
+fn studied() -> Selection {
+    Selection::of(&[sample::Channel::Fraction, sample::Channel::Sdf], None)
+}
+
+/// As [`study`], by so many workers at most: each holds a layer.
+///
+/// # Errors
+/// As [`study`].
+pub fn study_with(
+    workers: usize,
+    scene: &Scene,
+    plan: &Plan,
+    stop: &(dyn Fn() -> Result<(), Error> + Sync),
+    done: &mut dyn FnMut(&Row),
+) -> Result<Study, Error> {
     let volume = match scene.reference() {
         Some(reference) => Some(reference.volume()),
         None => scene.exact_volume(),
@@ -96,9 +136,12 @@ pub fn study(
     let volume = volume.filter(|v| *v > 0.0).ok_or(Error::NoReference)?;
     let mut rows = Vec::new();
     for &resolution in &plan.resolutions {
-        let mut finer = scene.clone();
-        finer.model_mut().0.step = GridStep::Resolution(resolution);
-        let row = row(&finer, resolution, volume, plan.offsets, stop)?;
+        let looked = Looked {
+            scene: &at(scene, resolution),
+            workers,
+            stop,
+        };
+        let row = row(looked, resolution, volume, plan.offsets)?;
         done(&row);
         rows.push(row);
     }
@@ -120,15 +163,17 @@ struct Sums {
     absolute: f64,
 }
 
-fn row(
-    scene: &Scene,
-    resolution: u32,
-    volume: f64,
-    offsets: u32,
-    stop: &(dyn Fn() -> Result<(), Error> + Sync),
-) -> Result<Row, Error> {
-    let grid = scene.grid()?;
-    let sums = layers(scene, &grid, stop)?;
+/// A scene, and how its layers are gone through.
+#[derive(Clone, Copy)]
+struct Looked<'a> {
+    scene: &'a Scene,
+    workers: usize,
+    stop: &'a (dyn Fn() -> Result<(), Error> + Sync),
+}
+
+fn row(looked: Looked<'_>, resolution: u32, volume: f64, offsets: u32) -> Result<Row, Error> {
+    let grid = looked.scene.grid()?;
+    let sums = layers(looked, &grid)?;
     let voxel = grid.voxel_volume();
     #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
     let count = |n: u64| n as f64;
@@ -142,7 +187,7 @@ fn row(
     });
     let mut mean = 0.0;
     for n in 0..offsets {
-        let inside = inside(scene, &moved(&grid, n)?, stop)?;
+        let inside = inside(looked, &moved(&grid, n)?)?;
         mean += relative(count(inside) * voxel) / f64::from(offsets);
     }
     let rounding = f64::from(f32::EPSILON) * count(total.touched);
@@ -182,45 +227,34 @@ fn moved(grid: &GridSpec, n: u32) -> Result<GridSpec, Error> {
 
 /// Calls `each` on every layer of a grid, in parallel; the results in order.
 fn over_layers<T: Send>(
-    scene: &Scene,
+    looked: Looked<'_>,
     grid: &GridSpec,
     selection: Selection,
-    stop: &(dyn Fn() -> Result<(), Error> + Sync),
     each: impl Fn(usize, &LayerBuffers) -> T + Sync,
 ) -> Result<Vec<T>, Error> {
     // What is studied is the grid, not the tables' tolerance.
-    let sampler = LayerSampler::new(scene.assembly(), grid, selection).with_exact_distances();
-    (0..grid.dims()[2])
-        .into_par_iter()
-        .map_init(LayerBuffers::default, |buffers, k| {
-            stop()?;
-            sampler.sample(k, buffers);
-            Ok(each(k, buffers))
-        })
-        .collect()
+    let sampler = LayerSampler::exact(looked.scene.assembly(), grid, selection);
+    let (count, workers) = (grid.dims()[2], looked.workers);
+    in_parts(count, workers, LayerBuffers::default, |buffers, k| {
+        (looked.stop)()?;
+        sampler.sample(k, buffers);
+        Ok(each(k, buffers))
+    })
 }
 
-fn inside(
-    scene: &Scene,
-    grid: &GridSpec,
-    stop: &(dyn Fn() -> Result<(), Error> + Sync),
-) -> Result<u64, Error> {
-    let layers = over_layers(scene, grid, Selection::default(), stop, |_, b| b.inside)?;
+fn inside(looked: Looked<'_>, grid: &GridSpec) -> Result<u64, Error> {
+    let layers = over_layers(looked, grid, Selection::default(), |_, b| b.inside)?;
     Ok(layers.iter().sum())
 }
 
-fn layers(
-    scene: &Scene,
-    grid: &GridSpec,
-    stop: &(dyn Fn() -> Result<(), Error> + Sync),
-) -> Result<Vec<Sums>, Error> {
-    let selection = Selection::of(&[sample::Channel::Fraction, sample::Channel::Sdf], None);
+fn layers(looked: Looked<'_>, grid: &GridSpec) -> Result<Vec<Sums>, Error> {
+    let scene = looked.scene;
     let [nx, ny, _] = grid.dims();
     let distance = |p: DVec3| match scene.reference() {
         Some(reference) => reference.signed_distance(p),
         None => scene.assembly().signed_distance(p),
     };
-    over_layers(scene, grid, selection, stop, |k, buffers| {
+    over_layers(looked, grid, studied(), |k, buffers| {
         let mut sums = Sums {
             inside: buffers.inside,
             // As stored, in f32.

@@ -96,14 +96,6 @@ const NONE: Cell = [NAN, 0, 0, 0];
 const NAN: u32 = 0x7fc0_0000;
 
 impl CellTable {
-    /// Bytes of what is kept.
-    pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.tiles)
-            + size_of_val(&*self.errors)
-            + size_of_val(&*self.cells)
-            + size_of_val(&*self.ridges)
-    }
-
     /// The cells of a field whose unit is `scale` scene units, each within `tolerance` region units of the distance;
     /// `None` where that takes too many.
     pub(crate) fn new(field: &MeridianField, scale: f64, tolerance: f64) -> Option<Self> {

@@ -193,11 +193,6 @@ impl Chain {
         2.0 * self.tolerance
     }
 
-    /// Bytes of what is kept.
-    pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.features) + self.lanes.bytes()
-    }
-
     /// Number of features.
     pub(crate) fn len(&self) -> usize {
         self.features.len()

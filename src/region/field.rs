@@ -72,11 +72,6 @@ impl MeridianField {
         &self.lattice.chain
     }
 
-    /// Bytes of what is kept.
-    pub(crate) fn bytes(&self) -> usize {
-        self.nodes.bytes() + self.lattice.chain.bytes()
-    }
-
     /// Side of the smallest cells.
     pub(crate) fn cell(&self) -> f64 {
         self.lattice.cell

@@ -94,14 +94,6 @@ impl Leaf {
 }
 
 impl Nodes {
-    /// Bytes of what is kept.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.quarters)
-            + size_of_val(&*self.leaves)
-            + size_of_val(&*self.pool)
-            + size_of_val(&*self.eights)
-    }
-
     /// Adds what another tree consists of; the number that its root gets.
     fn append(&mut self, root: Node, other: Self) -> Node {
         if self.quarters.is_empty() && self.leaves.is_empty() {

@@ -161,11 +161,6 @@ impl PolynomialTable {
         }
     }
 
-    /// Bytes of what is kept.
-    pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&*self.squares) + size_of_val(&*self.columns) + size_of_val(&*self.polynomials)
-    }
-
     /// The polynomial of a square, with R² and 1 / 2R.
     #[inline(always)]
     pub(crate) fn find(&self, [column, row]: [u32; 2]) -> Option<(&Polynomial, [f64; 2])> {

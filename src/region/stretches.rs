@@ -57,11 +57,6 @@ impl FeatureLanes {
         }
     }
 
-    /// Bytes of what is kept.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.eights) + size_of_val(&*self.special)
-    }
-
     /// The special features of a stretch.
     fn special(&self, [first, end]: Stretch) -> &[u32] {
         let from = self.special.partition_point(|&i| i < first);

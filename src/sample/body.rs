@@ -100,16 +100,16 @@ impl BodySampler {
         Self { body, way }
     }
 
-    /// The same without what stands for the exact distances.
-    pub(super) fn with_exact_distances(self) -> Self {
-        let way = match self.way {
-            Way::Upright { sides, .. } => Way::Upright {
+    /// The sampler of a body without what stands for the exact distances.
+    pub(super) fn exact(body: &Arc<Body>, grid: &GridSpec) -> Self {
+        let sides = body.revolved().and_then(|b| UprightBody::new(b, grid));
+        Self {
+            body: body.clone(),
+            way: sides.map_or(Way::Rows, |sides| Way::Upright {
                 sides,
                 distances: None,
-            },
-            Way::Tilted { .. } | Way::Rows => Way::Rows,
-        };
-        Self { way, ..self }
+            }),
+        }
     }
 
     /// Whether [`distances`](Self::distances) serves.
@@ -118,22 +118,6 @@ impl BodySampler {
             Way::Upright { distances, .. } => distances.is_some(),
             Way::Tilted { distances, .. } => !matches!(distances, TiltedDistances::None),
             Way::Rows => false,
-        }
-    }
-
-    /// Bytes that all threads share.
-    pub(super) fn bytes(&self) -> u64 {
-        match &self.way {
-            Way::Upright { distances, .. } => match distances {
-                Some(UprightDistances::Full(one)) => one.bytes(),
-                Some(UprightDistances::Partial(one)) => one.bytes(),
-                None => 0,
-            },
-            Way::Tilted { sides, distances } => match distances {
-                TiltedDistances::Partial(caps) => sides.bytes() + caps.bytes(),
-                TiltedDistances::Full | TiltedDistances::None => sides.bytes(),
-            },
-            Way::Rows => 0,
         }
     }
 

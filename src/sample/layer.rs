@@ -153,6 +153,27 @@ impl<'a> LayerSampler<'a> {
         grid: &'a GridSpec,
         selection: Selection,
     ) -> Self {
+        Self::with_bodies(kernel, assembly, grid, selection, |body| {
+            BodySampler::new(kernel, body, grid, selection.sdf)
+        })
+    }
+
+    /// A sampler that asks the exact path for every distance: slower, and within one ulp of it. It keeps no tables.
+    #[must_use]
+    pub fn exact(assembly: &'a Assembly, grid: &'a GridSpec, selection: Selection) -> Self {
+        let kernel = Kernel::default();
+        Self::with_bodies(kernel, assembly, grid, selection, |body| {
+            BodySampler::exact(body, grid)
+        })
+    }
+
+    fn with_bodies(
+        kernel: Kernel,
+        assembly: &'a Assembly,
+        grid: &'a GridSpec,
+        selection: Selection,
+        sampler: impl Fn(&Arc<Body>) -> BodySampler + Send + Sync,
+    ) -> Self {
         let fractions = selection
             .fraction
             .then(|| FractionSampler::new(assembly, grid.spacing()));
@@ -163,8 +184,7 @@ impl<'a> LayerSampler<'a> {
         } else {
             (assembly.bodies().to_vec(), Vec::new())
         };
-        let bodies = assembly.bodies().par_iter();
-        let bodies = bodies.map(|b| BodySampler::new(kernel, b, grid, selection.sdf));
+        let bodies = assembly.bodies().par_iter().map(sampler);
         Self {
             cancel: None,
             assembly,
@@ -177,16 +197,6 @@ impl<'a> LayerSampler<'a> {
             kernel,
             bodies: bodies.collect(),
             single: assembly.single_index(),
-        }
-    }
-
-    /// A sampler that asks the exact path for every distance: slower, and within one ulp of it.
-    #[must_use]
-    pub fn with_exact_distances(self) -> Self {
-        let bodies = self.bodies.into_iter();
-        Self {
-            bodies: bodies.map(BodySampler::with_exact_distances).collect(),
-            ..self
         }
     }
 
@@ -222,15 +232,8 @@ impl<'a> LayerSampler<'a> {
                     + each(selection.material, 4))
     }
 
-    /// Bytes that the sampler itself keeps for all threads, beside the layers' buffers: tables for distances, which
-    /// [`with_exact_distances`](Self::with_exact_distances) does without.
-    #[must_use]
-    pub fn shared_bytes(&self) -> u64 {
-        self.bodies.iter().map(BodySampler::bytes).sum()
-    }
-
     /// Bytes that each thread takes beside [`bytes_per_layer`](Self::bytes_per_layer): the distances of a composite's
-    /// bodies, which [`with_exact_distances`](Self::with_exact_distances) does without.
+    /// bodies, which an [`exact`](Self::exact) sampler does without.
     #[must_use]
     pub fn bytes_per_thread(&self) -> u64 {
         if self.single.is_some() || !(self.selection.sdf && self.fills_distance()) {

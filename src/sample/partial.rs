@@ -147,11 +147,6 @@ impl PartialSampler {
         })
     }
 
-    /// Bytes that all threads share.
-    pub(super) fn bytes(&self) -> u64 {
-        (self.plane.bytes() + self.swept.bytes() + self.edges.bytes()) as u64
-    }
-
     /// Fills a layer with signed distances.
     pub(super) fn layer(
         &self,

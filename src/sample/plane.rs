@@ -150,11 +150,6 @@ impl Plane {
         self.rows
     }
 
-    /// Bytes of what is kept.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.radii) + size_of_val(&*self.blocks)
-    }
-
     /// The radii of rows that follow each other, padding included.
     pub(super) fn radii(&self, rows: Range<usize>) -> Radii<'_> {
         let (padded, width) = (self.padded, self.padded / BLOCK);

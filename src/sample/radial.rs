@@ -239,11 +239,6 @@ impl RadialSampler {
         Some(())
     }
 
-    /// Bytes that all threads share.
-    pub(super) fn bytes(&self) -> u64 {
-        (self.plane.bytes() + self.field.bytes()) as u64
-    }
-
     /// Fills in what the table left open of a row's stored part.
     fn mend(&self, at: Mend<'_>, marks: &[u8], part: &mut [f32]) {
         let (words, rest) = marks.as_chunks::<8>();

@@ -164,11 +164,6 @@ impl TiltedSampler {
         })
     }
 
-    /// Bytes that all threads share.
-    pub(super) fn bytes(&self) -> u64 {
-        (self.field.bytes() + self.table.bytes() + self.polynomials.bytes()) as u64
-    }
-
     /// A layer as places see it.
     #[allow(clippy::cast_precision_loss, reason = "voxel numbers are below 2^31")]
     fn view(&self, k: usize) -> LayerView {

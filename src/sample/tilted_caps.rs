@@ -138,11 +138,6 @@ impl TiltedCaps {
         })
     }
 
-    /// Bytes that all threads share.
-    pub(super) fn bytes(&self) -> u64 {
-        (self.field.bytes() + self.table.bytes()) as u64
-    }
-
     /// Fills a layer with signed distances.
     pub(super) fn layer(
         &self,

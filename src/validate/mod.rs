@@ -23,6 +23,7 @@ use crate::grid::GridSpec;
 use crate::mesh::{Mesh, MeshError, MeshTree, tessellate};
 use crate::sample::{Channel, LayerBuffers, LayerSampler, Selection};
 use crate::scene::Scene;
+use crate::work::in_parts;
 use field::{Field, Stencil};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -181,6 +182,39 @@ pub fn validate(
     stop: Stop,
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<Report, Error> {
+    let workers = rayon::current_num_threads();
+    validate_with(workers, scene, grid, meshes, points, stop, done)
+}
+
+/// Bytes that a worker of [`validate_with`] takes.
+#[must_use]
+pub fn bytes_per_worker(scene: &Scene, grid: &GridSpec, points: Points) -> u64 {
+    match points {
+        Points::Grid => {
+            let layers = (SLAB + 2).min(grid.dims()[2]) as u64;
+            let selection = Selection::of(&[Channel::Sdf], None);
+            LayerSampler::bytes_per_layer(scene.assembly(), grid, &selection).saturating_mul(layers)
+        }
+        Points::Random(_) => 0,
+    }
+}
+
+/// As [`validate()`], by so many workers at most: each holds some layers.
+///
+/// # Errors
+/// As [`validate()`].
+///
+/// # Panics
+/// As [`validate()`].
+pub fn validate_with(
+    workers: usize,
+    scene: &Scene,
+    grid: &GridSpec,
+    meshes: &[PartMesh],
+    points: Points,
+    stop: Stop,
+    done: &(dyn Fn(u64) + Sync),
+) -> Result<Report, Error> {
     assert_eq!(
         scene.assembly().parts().len(),
         meshes.len(),
@@ -192,17 +226,14 @@ pub fn validate(
         Points::Grid => {
             let selection = Selection::of(&[Channel::Sdf], None);
             // The field's checks know no tolerance of tables.
-            let sampler =
-                LayerSampler::new(scene.assembly(), grid, selection).with_exact_distances();
-            (0..grid.dims()[2].div_ceil(SLAB))
-                .into_par_iter()
-                .map(|n| {
-                    stop()?;
-                    let found = slab(&sampler, grid, &votes, &field, n * SLAB);
-                    done(found.0.samples);
-                    Ok(found)
-                })
-                .collect::<Result<_, Error>>()?
+            let sampler = LayerSampler::exact(scene.assembly(), grid, selection);
+            let slabs = grid.dims()[2].div_ceil(SLAB);
+            in_parts(slabs, workers, Vec::new, |layers, n| {
+                stop()?;
+                let found = slab(&sampler, grid, &votes, &field, n * SLAB, layers);
+                done(found.0.samples);
+                Ok(found)
+            })?
         }
         Points::Random(count) => (0..count.div_ceil(CHUNK))
             .into_par_iter()
@@ -248,17 +279,17 @@ fn slab(
     votes: &Votes,
     field: &Field,
     first: usize,
+    layers: &mut Vec<LayerBuffers>,
 ) -> (Ballot, FieldChecks) {
     let [nx, ny, nz] = grid.dims();
     let end = (first + SLAB).min(nz);
     let start = first.saturating_sub(1);
-    let layers: Vec<LayerBuffers> = (start..(end + 1).min(nz))
-        .map(|k| {
-            let mut layer = LayerBuffers::default();
-            sampler.sample(k, &mut layer);
-            layer
-        })
-        .collect();
+    let held = start..(end + 1).min(nz);
+    layers.resize_with(layers.len().max(held.len()), LayerBuffers::default);
+    for (k, layer) in held.zip(&mut *layers) {
+        sampler.sample(k, layer);
+    }
+    let layers = &*layers;
     let value = |i: usize, j: usize, k: usize| layers[k - start].sdf[j * nx + i];
     let (mut ballot, mut checks) = (Ballot::default(), FieldChecks::default());
     for k in first..end {
