@@ -137,6 +137,9 @@ fn excerpt(error: &SceneError, colored: bool) -> String {
     let (Some(problem), Some((text, span))) = (error.problem(), error.source_text()) else {
         return String::new();
     };
+    if problem.from_file {
+        return String::new();
+    }
     // The lines that would be shown: the one that is wrong and its neighbours.
     let line_start = |at: usize| text[..at].rfind('\n').map_or(0, |n| n + 1);
     let first = line_start(span.start);
@@ -144,7 +147,11 @@ fn excerpt(error: &SceneError, colored: bool) -> String {
     let shown = text[before..]
         .split('\n')
         .take(if before < first { 3 } else { 2 });
-    if shown.map(str::len).any(|n| n > LONGEST_LINE) {
+    let is_raw = |line: &str| line.contains(|c: char| c.is_control() && !matches!(c, '\t' | '\r'));
+    if shown
+        .into_iter()
+        .any(|line| line.len() > LONGEST_LINE || is_raw(line))
+    {
         return String::new();
     }
     // A span over many lines is marked at its first.

@@ -60,11 +60,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
             .with_target(false)
             .init();
     }
-    let threads = common.threads.map_or(0, std::num::NonZeroUsize::get);
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build_global()
-        .map_err(|e| Failure::usage(format!("cannot start {threads} threads: {e}")))?;
+    start_threads(common.threads.map(std::num::NonZeroUsize::get))?;
     interrupt::listen(*console);
     match &arguments.command {
         Command::Voxelize(a) => voxelize::run(a, common, console),
@@ -79,4 +75,39 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),
     }
+}
+
+/// More threads than this help nobody, however many cores there are.
+const MOST_THREADS: usize = 64;
+
+/// Starts the threads that everything runs on: so many, or as many as `RAYON_NUM_THREADS` says, or one for each core.
+fn start_threads(asked: Option<usize>) -> Result<(), Failure> {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    let most = MOST_THREADS.max(4 * cores);
+    let named = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok();
+    let (threads, by) = match asked {
+        Some(threads) => (threads, "--threads"),
+        None => match named().filter(|threads| *threads > 0) {
+            Some(threads) => (threads, "RAYON_NUM_THREADS"),
+            None => (cores, "without --threads"),
+        },
+    };
+    if asked.is_some() || by == "RAYON_NUM_THREADS" {
+        check_threads(threads, by, most)?;
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    pool.build_global().map_err(|error| {
+        Failure::files(format!(
+            "cannot start {threads} threads: {error}; give a smaller --threads, or allow the process more threads or memory"
+        ))
+    })
+}
+
+fn check_threads(threads: usize, by: &str, most: usize) -> Result<(), Failure> {
+    if threads <= most {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "{by}: {threads} threads are more than {most}, the most that are started; leave it out for one for each core"
+    )))
 }

@@ -129,6 +129,16 @@ impl ExchangeError {
     }
 }
 
+/// A reader's reason, which may repeat names out of the text: not more of it than fits a line.
+pub(super) fn brief(reason: &str) -> String {
+    const MOST: usize = 160;
+    if reason.chars().count() <= MOST {
+        reason.to_owned()
+    } else {
+        reason.chars().take(MOST).chain("...".chars()).collect()
+    }
+}
+
 /// What a text holds at a place, short enough for a message.
 pub(super) fn quoted(text: &str) -> String {
     const MOST: usize = 40;

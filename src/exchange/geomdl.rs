@@ -21,7 +21,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value};
 
-use super::error::quoted;
+use super::error::{brief, quoted};
 use super::evidence::Agreement;
 use super::spline::{Parts, knot_vector, nets, parameter};
 use super::{ExchangeError, Format, Net, Place, Reading};
@@ -53,7 +53,7 @@ pub fn read(text: &str) -> Result<Reading, ExchangeError> {
                 column: error.column(),
             },
             format: "JSON",
-            reason: reason.strip_suffix(&place).unwrap_or(&reason).to_string(),
+            reason: brief(reason.strip_suffix(&place).unwrap_or(&reason)),
         }
     })?;
     let root = Node::of("", &value)?;

@@ -16,7 +16,8 @@
 //! such as the interfaces of a `MultiPatch`, add nothing to the geometry and are passed over.
 //!
 //! * Units: those of the file.
-//! * Limits: document types (DTD), numbers in other encodings than text, periodic bases and knot vectors
+//! * Limits: at most 64 attributes of an element, 64 declarations of name spaces and a million elements and texts between
+//!   them, so that time and memory follow the length of the text; document types (DTD), numbers in other encodings than text, periodic bases and knot vectors
 //!   given by a rule are refused.
 //! * Source: G+Smo, the files of its `filedata` and the class gsXml.
 
@@ -24,7 +25,7 @@ use std::fmt::Write as _;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::error::quoted;
+use super::error::{brief, quoted};
 use super::evidence::Agreement;
 use super::scan::{Scanner, place_of};
 use super::spline::{Parts, knot_vector, net_size, nets, parameter};
@@ -57,8 +58,10 @@ const TYPES: [(&str, usize, bool); 6] = [
 /// # Ok::<(), voxlathe::exchange::ExchangeError>(())
 /// ```
 pub fn read(text: &str) -> Result<Reading, ExchangeError> {
+    check_tags(text)?;
     let options = ParsingOptions {
         allow_dtd: false,
+        nodes_limit: MAX_NODES,
         ..ParsingOptions::default()
     };
     let document = Document::parse_with_options(text, options).map_err(|error| {
@@ -71,7 +74,7 @@ pub fn read(text: &str) -> Result<Reading, ExchangeError> {
                 column: usize::try_from(at.col).unwrap_or(usize::MAX),
             },
             format: "XML",
-            reason: reason.strip_suffix(&tail).unwrap_or(&reason).to_string(),
+            reason: brief(reason.strip_suffix(&tail).unwrap_or(&reason)),
         }
     })?;
     let file = Xml { text };
@@ -87,6 +90,65 @@ pub fn read(text: &str) -> Result<Reading, ExchangeError> {
         return Err(file.unexpected(root, "no <Geometry> in <xml>".into(), "at least one"));
     }
     Ok(reading)
+}
+
+/// Elements, and texts between them, of a file: some hundred bytes each, whatever they are written with.
+const MAX_NODES: u32 = 1_000_000;
+/// Attributes of an element. The reader compares each with all others of its element; G+Smo writes up to five.
+const MAX_ATTRIBUTES: usize = 64;
+/// Declarations of name spaces in a file, which every element within hands on; G+Smo writes none.
+const MAX_NAMESPACES: usize = 64;
+
+/// Refuses tags that would take the reader of XML a time not linear in the text: goes through it once, from tag to tag.
+fn check_tags(text: &str) -> Result<(), ExchangeError> {
+    let bytes = text.as_bytes();
+    let after = |from: usize, end: &str| {
+        let rest = text.get(from..).unwrap_or_default();
+        rest.find(end).map_or(text.len(), |n| from + n + end.len())
+    };
+    let (mut at, mut namespaces) = (0, 0);
+    while let Some(start) = text
+        .get(at..)
+        .and_then(|rest| rest.find('<'))
+        .map(|n| at + n)
+    {
+        let rest = &text[start..];
+        if rest.starts_with("<!--") {
+            at = after(start + 4, "-->");
+        } else if rest.starts_with("<![CDATA[") {
+            at = after(start + 9, "]]>");
+        } else if rest.starts_with("<?") {
+            at = after(start + 2, "?>");
+        } else {
+            let mut attributes = 0;
+            at = start + 1;
+            while let Some(&c) = bytes.get(at) {
+                at += 1;
+                match c {
+                    b'>' => break,
+                    b'"' | b'\'' => at = after(at, if c == b'"' { "\"" } else { "'" }),
+                    b'=' => attributes += 1,
+                    b'x' if bytes[at - 1..].starts_with(b"xmlns") => namespaces += 1,
+                    _ => {}
+                }
+                let most = [
+                    (attributes, MAX_ATTRIBUTES, "attributes of an element"),
+                    (
+                        namespaces,
+                        MAX_NAMESPACES,
+                        "declarations of name spaces in a file",
+                    ),
+                ];
+                if let Some((_, most, what)) = most.into_iter().find(|m| m.0 > m.1) {
+                    return Err(ExchangeError::Unsupported {
+                        place: place_of(text, start),
+                        what: format!("more than {most} {what}, the most that are read"),
+                    });
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The text, for places.

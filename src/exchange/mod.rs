@@ -55,11 +55,10 @@ mod scan;
 mod spline;
 
 use std::fmt;
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use crate::io::{IoError, write_file_atomically};
+use crate::io::{IoError, open_regular, write_file_atomically};
 use crate::nurbs::{NurbsCurve, NurbsSurface, NurbsVolume};
 
 pub use error::{ExchangeError, Place};
@@ -246,8 +245,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<Reading, ExchangeError> {
 
 fn read_file(path: &Path) -> Result<Reading, ExchangeError> {
     let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
+    let file = open_regular(path).map_err(IoError::open(path))?;
+    (file.take(MAX_FILE_BYTES + 1))
+        .read_to_end(&mut bytes)
         .map_err(|source| IoError::Read {
             path: path.into(),
             source,

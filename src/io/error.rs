@@ -165,6 +165,12 @@ pub enum IoError {
         /// The file.
         path: PathBuf,
     },
+    /// What should be read is no regular file.
+    #[error("{} is no regular file; pipes, devices and files of the kernel are not read: write it to a file first", path.display())]
+    NotRegular {
+        /// The path asked for.
+        path: PathBuf,
+    },
     /// A line of a point file is wrong.
     #[error("{}:{line}:{column}: {reason}, found {value:?}; each line is x, y, z with commas or blanks between", path.display())]
     PointLine {
@@ -241,6 +247,15 @@ impl IoError {
                 aside,
                 source: Box::new(error),
             },
+        }
+    }
+
+    /// As [`read`](Self::read), for a file that must be a regular one.
+    pub(crate) fn open(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| match source.kind() {
+            std::io::ErrorKind::InvalidInput => Self::NotRegular { path },
+            _ => Self::Read { path, source },
         }
     }
 

@@ -25,6 +25,7 @@ pub(crate) mod leftovers;
 pub mod manifest;
 pub mod mesh;
 pub mod points;
+mod regular;
 #[cfg(feature = "cli")]
 pub(crate) mod scratch;
 mod single;
@@ -37,6 +38,7 @@ pub use error::{IoError, IoErrorKind};
 pub use manifest::Manifest;
 pub use mesh::write_mesh;
 pub use points::{read_points, write_columns};
+pub(crate) use regular::open_regular;
 pub use single::write_file_atomically;
 pub use stack::{StackWriter, write_stack};
 pub use verify::{StackReport, verify_stack};

@@ -7,17 +7,18 @@
 //!   format versions 1 to 3. Results are float64 of shape (n, columns) in C order.
 //!
 //! Nothing is allocated on the word of a file: an array's shape must agree with the size of the
-//! file, and lines are read one by one with a limit on their length.
+//! file, and lines are read one by one with a limit on their length. Files are regular ones, of at most
+//! [`MAX_POINTS`] points.
 //!
 //! Source: NumPy Enhancement Proposal 1, *A simple file format for NumPy arrays*.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::error::IoError;
+use super::regular::open_regular;
 use super::single::write_file_atomically;
 
 /// A longer line is no point; three numbers of 17 digits take 80 bytes.
@@ -25,6 +26,9 @@ const MAX_LINE: u64 = 64 << 10;
 
 /// A header of an array file longer than this is refused; those of plain arrays take 118 bytes.
 const MAX_HEADER: usize = 64 << 10;
+
+/// The most points that are read: their answers take some 100 bytes each.
+pub const MAX_POINTS: usize = 1 << 26;
 
 const NPY_MAGIC: &[u8; 6] = b"\x93NUMPY";
 
@@ -55,14 +59,11 @@ impl Table {
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<DVec3>, IoError> {
     let path = path.as_ref();
     let table = Table::of(path)?;
-    let file = File::open(path).map_err(IoError::read(path))?;
+    let file = open_regular(path).map_err(IoError::open(path))?;
     match table {
-        Table::Csv => read_csv(path, BufReader::new(file)),
+        Table::Csv => read_csv(path, BufReader::new(file), MAX_POINTS),
         Table::Npy => {
             let data = file.metadata().map_err(IoError::read(path))?;
-            if !data.is_file() {
-                return Err(array(path, "it is not a regular file".into()));
-            }
             read_npy(path, BufReader::new(file), data.len())
         }
     }
@@ -104,7 +105,7 @@ fn fields(line: &str) -> Vec<Field<'_>> {
     }
 }
 
-fn read_csv(path: &Path, mut reader: impl BufRead) -> Result<Vec<DVec3>, IoError> {
+fn read_csv(path: &Path, mut reader: impl BufRead, most: usize) -> Result<Vec<DVec3>, IoError> {
     let mut points = Vec::new();
     let mut header_allowed = true;
     let mut bytes = Vec::new();
@@ -168,10 +169,17 @@ fn read_csv(path: &Path, mut reader: impl BufRead) -> Result<Vec<DVec3>, IoError
         if let Some(&(column, field)) = fields.get(3) {
             return refuse(column, field, "three numbers are wanted, not more");
         }
+        if points.len() >= most {
+            let (column, field) = fields[0];
+            return refuse(column, field, TOO_MANY);
+        }
         points.push(DVec3::from(point));
     }
     Ok(points)
 }
+
+const TOO_MANY: &str = "no more than 67108864 points are read from a file, split it";
+const _: () = assert!(MAX_POINTS == 67_108_864);
 
 fn array(path: &Path, reason: String) -> IoError {
     IoError::Array {
@@ -241,8 +249,10 @@ fn read_npy(path: &Path, mut reader: impl Read, size: u64) -> Result<Vec<DVec3>,
             size - data_start
         ));
     }
-    let Ok(count) = usize::try_from(rows) else {
-        return refuse(format!("its {rows} rows do not fit the memory"));
+    let Some(count) = usize::try_from(rows).ok().filter(|n| *n <= MAX_POINTS) else {
+        return refuse(format!(
+            "its {rows} rows are more than {MAX_POINTS}, the most that are read"
+        ));
     };
     let mut points = vec![DVec3::ZERO; count];
     let mut sample = [0; 8];
@@ -442,7 +452,7 @@ mod tests {
     use std::fs;
 
     fn csv(text: &str) -> Result<Vec<DVec3>, String> {
-        read_csv(Path::new("p.csv"), text.as_bytes()).map_err(|e| e.to_string())
+        read_csv(Path::new("p.csv"), text.as_bytes(), MAX_POINTS).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -514,7 +524,34 @@ mod tests {
                 .unwrap_err()
                 .starts_with("p.csv:1:1: the line is too long, found \"1111")
         );
-        assert!(read_csv(Path::new("p.csv"), &b"\xff\xfe\x00 1 2\n1 2 3"[..]).is_err());
+        assert!(
+            read_csv(
+                Path::new("p.csv"),
+                &b"\xff\xfe\x00 1 2\n1 2 3"[..],
+                MAX_POINTS
+            )
+            .is_err()
+        );
+    }
+
+    #[test]
+    fn points_are_counted() {
+        let few = |text: &str| read_csv(Path::new("p.csv"), text.as_bytes(), 2);
+        assert_eq!(few("1,2,3\n4,5,6\n# end\n").map_or(0, |p| p.len()), 2);
+        assert!(few("1,2,3\n4,5,6\n\n 7,8,9\n").is_err_and(|e| {
+            e.to_string()
+                .starts_with(&format!("p.csv:4:2: {TOO_MANY}, found \"7\""))
+        }));
+        let rows = MAX_POINTS as u64 + 1;
+        let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, 3), }}");
+        let bytes = npy(1, &header, &[]);
+        let size = bytes.len() as u64 + 12 * rows;
+        let found = read_npy(Path::new("p.npy"), &bytes[..], size).expect_err("too many");
+        assert!(
+            found
+                .to_string()
+                .contains("its 67108865 rows are more than 67108864")
+        );
     }
 
     fn npy(version: u8, header: &str, data: &[u8]) -> Vec<u8> {

@@ -61,6 +61,8 @@ pub struct InputProblem {
     pub source_name: String,
     /// Whether the text is that of a `--set`; its line and column are then not displayed.
     pub from_set: bool,
+    /// Whether the text is that of a file which the scene names: of such a file no more should be shown than `found`.
+    pub from_file: bool,
     /// Line of the value, from 1.
     pub line: usize,
     /// Column of the value in characters, from 1.
@@ -184,6 +186,7 @@ impl Sources {
             problem: Box::new(InputProblem {
                 source_name: source.name.clone(),
                 from_set: source.from_set,
+                from_file: place.source != 0 && !source.from_set,
                 line,
                 column,
                 span: place.span(),

@@ -83,7 +83,7 @@ impl Reader<'_> {
             }
             Some(b'{') => self.table(depth)?,
             Some(b'[') => self.array(depth)?,
-            Some(b'"') => Kind::String(self.string()?),
+            Some(b'"') => Kind::String(self.string()?.into()),
             Some(b'-' | b'0'..=b'9') => self.number()?,
             _ => self.word()?,
         };
@@ -235,7 +235,7 @@ impl Reader<'_> {
         self.skip_blanks();
         if self.peek() == Some(b']') {
             self.at += 1;
-            return Ok(Kind::Array(elements));
+            return Ok(Kind::Array(elements.into()));
         }
         loop {
             self.skip_blanks();
@@ -252,7 +252,7 @@ impl Reader<'_> {
                 Some(b',') => self.at += 1,
                 Some(b']') => {
                     self.at += 1;
-                    return Ok(Kind::Array(elements));
+                    return Ok(Kind::Array(elements.into()));
                 }
                 _ => return Err(self.unexpected("`,` or `]`")),
             }
@@ -391,7 +391,7 @@ mod tests {
         else {
             panic!("a string")
         };
-        assert_eq!(text, "aé🏺\n/é");
+        assert_eq!(&*text, "aé🏺\n/é");
         assert!(read(r#""\ud83c""#).is_err());
         assert!(read(r#""\ud83c\u0041""#).is_err());
         assert!(read(r#""\u00é9""#).is_err());

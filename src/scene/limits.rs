@@ -3,16 +3,26 @@
 //! The limits keep hostile input from exhausting memory or the stack, and keep every later product
 //! and quotient of scene numbers inside the range of f64. Real scenes stay orders of magnitude inside.
 
-/// Bytes of scene text, and of all point files of a scene together. A tree of values is some forty
-/// times its densest text, so this also bounds the memory that reading takes.
+/// Bytes of scene text, and of all point files of a scene together. A tree of values is at most some twenty times its
+/// densest text, so this also bounds the memory that reading takes.
 pub const MAX_TEXT_BYTES: usize = 64 << 20;
+
+/// Keys of one table; only those that name things, as materials do, are as many as they like.
+pub const MAX_KEYS: usize = 100_000;
+
+/// Tables of one text, arrays of tables and inline ones included: a table takes some hundred bytes, whatever it is
+/// written with.
+pub const MAX_TABLES: usize = 1_000_000;
 
 /// Nesting of arrays and tables. A scene needs eight; the reader recurses once per level.
 pub(super) const MAX_DEPTH: usize = 64;
 
-/// Stack of the thread that reads TOML. The parser limits brackets inside each other to 80 and the
-/// parts of a dotted key to 80, so a tree of 80 * 80 levels can come out, which is dropped by
-/// recursion; this leaves 10 kB a level. The memory is touched only as far as it is used.
+/// Bytes of a TOML text that is read a second time, by the `toml` crate, for what it says of a slip. It takes seventy
+/// times as much.
+pub(super) const MAX_EXPLAINED: usize = 128 << 10;
+
+/// Stack of the thread that does so: the crate goes into brackets to 80 levels, and into dotted keys to as many at each.
+/// The memory is touched only as far as it is used.
 pub(super) const TOML_STACK_BYTES: usize = 64 << 20;
 
 /// Segments of a `--set` path.

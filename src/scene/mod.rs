@@ -40,6 +40,7 @@ mod shapes;
 mod solid;
 #[cfg(test)]
 mod tests;
+mod toml_reader;
 mod value;
 mod volume;
 
@@ -48,8 +49,8 @@ pub use error::{InputProblem, Place, SceneError, Sources};
 #[cfg(feature = "cli")]
 pub(crate) use keys::nearest;
 pub use limits::{
-    MAX_CELLS, MAX_COEFFICIENTS, MAX_DEGREE, MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_NAME,
-    MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
+    MAX_CELLS, MAX_COEFFICIENTS, MAX_DEGREE, MAX_FILE_POINTS, MAX_KEYS, MAX_MAGNITUDE, MAX_NAME,
+    MAX_TABLES, MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
     AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName, CurveForm,

@@ -3,13 +3,13 @@
 //! One point on a line: r, z and optionally the weight, with a comma or blanks between. What follows
 //! `#` is a comment; empty lines mean nothing.
 
-use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use super::error::{Fault, Place, Sources};
 use super::limits::{MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_TEXT_BYTES};
 use super::model::PointModel;
+use crate::io::open_regular;
 
 /// Reads points files, within the limits of one scene.
 #[derive(Debug)]
@@ -83,18 +83,15 @@ impl PointFiles {
         let path = self.base_dir.join(file);
         let shown = path.display().to_string();
         let unreadable = |error| Fault::read(place, shown.clone(), error);
-        // A pipe or a device could keep the reader waiting or reading for ever.
-        let metadata = std::fs::metadata(&path).map_err(unreadable)?;
-        if !metadata.is_file() {
-            return Err(Fault::value(place, "a regular file"));
-        }
+        let opened = match open_regular(&path) {
+            Err(error) if error.kind() == ErrorKind::InvalidInput => {
+                return Err(Fault::value(place, "a regular file"));
+            }
+            opened => opened.map_err(unreadable)?,
+        };
         let mut bytes = Vec::new();
-        File::open(&path)
-            .and_then(|opened| {
-                opened
-                    .take(self.bytes_left as u64 + 1)
-                    .read_to_end(&mut bytes)
-            })
+        (opened.take(self.bytes_left as u64 + 1))
+            .read_to_end(&mut bytes)
             .map_err(unreadable)?;
         if bytes.len() > self.bytes_left {
             return Err(Fault::value(

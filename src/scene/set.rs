@@ -86,7 +86,7 @@ fn read_value(argument: &str, at: usize, source: u32) -> Value {
     let trimmed = raw.trim();
     let start = at + (raw.len() - raw.trim_start().len());
     from_toml_value(trimmed, source, start).unwrap_or_else(|| Value {
-        kind: Kind::String(trimmed.to_owned()),
+        kind: Kind::String(trimmed.into()),
         place: Place::new(source, start..start + trimmed.len()),
     })
 }

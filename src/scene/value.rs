@@ -1,10 +1,10 @@
 //! One tree of values with the place of each, for TOML and JSON alike.
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 use super::error::{Fault, Place, shorten};
-use super::limits::{MAX_DEPTH, TOML_STACK_BYTES};
+use super::limits::{MAX_EXPLAINED, TOML_STACK_BYTES};
+use super::toml_reader::{self, Refusal};
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]
@@ -23,12 +23,15 @@ pub(super) enum Kind {
     Integer(i64),
     /// Any other number; not finite where it was written so or overflows.
     Float(f64),
-    String(String),
+    String(Box<str>),
     Date,
-    Array(Vec<Value>),
+    Array(Box<[Value]>),
     /// In the order of the text, each key once.
     Table(Vec<Entry>),
 }
+
+// Arrays of a million numbers are nothing out of the way.
+const _: () = assert!(size_of::<Value>() <= 40);
 
 /// A key and its value.
 #[derive(Debug, Clone)]
@@ -60,29 +63,23 @@ impl Value {
 
 /// Reads a TOML document. `source` is the index of `text` among the sources.
 pub(super) fn from_toml(text: &str, source: u32) -> Result<Value, Fault> {
-    with_stack(|| {
-        let table = DeTable::parse(text).map_err(|error| toml_fault(text, source, &error))?;
-        let (span, table) = (table.span(), table.into_inner());
-        Ok(Value {
-            kind: table_kind(table, source, 0, 0)?,
-            place: Place::new(source, span),
-        })
-    })
-    .unwrap_or_else(|error| {
-        let place = Place::new(source, 0..0);
-        Err(Fault::read(place, "the scene".to_owned(), error))
+    toml_reader::document(text, source).map_err(|refusal| match refusal {
+        Refusal::Syntax(fault) if text.len() <= MAX_EXPLAINED => {
+            explained(text, source).unwrap_or(fault)
+        }
+        other => other.into_fault(),
     })
 }
 
 /// Reads a lone TOML value that stands at byte `offset` of text `source`; `None` if it is not TOML.
 pub(super) fn from_toml_value(text: &str, source: u32, offset: usize) -> Option<Value> {
-    with_stack(|| {
-        DeValue::parse(text)
-            .ok()
-            .and_then(|value| convert(value, source, offset, 0).ok())
-    })
-    .ok()
-    .flatten()
+    toml_reader::lone_value(text, source, offset).ok()
+}
+
+/// What the `toml` crate says of a short text: it knows what is meant by many a slip.
+fn explained(text: &str, source: u32) -> Option<Fault> {
+    let error = with_stack(|| DeTable::parse(text).err()).ok()??;
+    Some(toml_fault(text, source, &error))
 }
 
 /// Does the work where recursion has room: see [`TOML_STACK_BYTES`].
@@ -120,63 +117,4 @@ fn toml_fault(text: &str, source: u32, error: &toml::de::Error) -> Fault {
     };
     let reason = error.message().replace(['\n', '\r'], " ");
     Fault::found(place, found, format!("valid toml ({reason})"))
-}
-
-fn convert(
-    value: Spanned<DeValue<'_>>,
-    source: u32,
-    offset: usize,
-    depth: usize,
-) -> Result<Value, Fault> {
-    let span = value.span();
-    let place = Place::new(source, span.start + offset..span.end + offset);
-    if depth > MAX_DEPTH {
-        return Err(Fault::found(
-            place,
-            "deeper nesting",
-            format!("at most {MAX_DEPTH} arrays and tables inside each other"),
-        ));
-    }
-    let kind = match value.into_inner() {
-        DeValue::String(text) => Kind::String(text.into_owned()),
-        DeValue::Boolean(is) => Kind::Bool(is),
-        DeValue::Datetime(_) => Kind::Date,
-        DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
-            Ok(value) => Kind::Integer(value),
-            Err(_) if integer.radix() == 10 => float(integer.as_str(), place)?,
-            Err(_) => return Err(Fault::value(place, "an integer of at most 64 bits")),
-        },
-        DeValue::Float(number) => float(number.as_str(), place)?,
-        DeValue::Array(array) => Kind::Array(
-            array
-                .into_iter()
-                .map(|element| convert(element, source, offset, depth + 1))
-                .collect::<Result<_, _>>()?,
-        ),
-        DeValue::Table(table) => table_kind(table, source, offset, depth)?,
-    };
-    Ok(Value { kind, place })
-}
-
-/// The nearest f64 of a decimal number; infinity where it overflows, which no key accepts.
-fn float(text: &str, place: Place) -> Result<Kind, Fault> {
-    text.parse()
-        .map(Kind::Float)
-        .map_err(|_| Fault::value(place, "a number"))
-}
-
-fn table_kind(table: DeTable<'_>, source: u32, offset: usize, depth: usize) -> Result<Kind, Fault> {
-    let mut entries = table
-        .into_iter()
-        .map(|(key, value)| {
-            let span = key.span();
-            Ok(Entry {
-                key: key.into_inner().into_owned(),
-                key_place: Place::new(source, span.start + offset..span.end + offset),
-                value: convert(value, source, offset, depth + 1)?,
-            })
-        })
-        .collect::<Result<Vec<_>, Fault>>()?;
-    entries.sort_by_key(|entry| entry.key_place);
-    Ok(Kind::Table(entries))
 }
