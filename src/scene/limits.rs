@@ -14,6 +14,9 @@ pub const MAX_KEYS: usize = 100_000;
 /// written with.
 pub const MAX_TABLES: usize = 1_000_000;
 
+/// Solids of one scene: each is held against all others before the first voxel, which takes some ten seconds here.
+pub const MAX_SOLIDS: usize = 4096;
+
 /// Nesting of arrays and tables. A scene needs eight; the reader recurses once per level.
 pub(super) const MAX_DEPTH: usize = 64;
 

@@ -18,6 +18,7 @@
 
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 mod build;
 mod error;
@@ -50,7 +51,7 @@ pub use error::{InputProblem, Place, SceneError, Sources};
 pub(crate) use keys::nearest;
 pub use limits::{
     MAX_CELLS, MAX_COEFFICIENTS, MAX_DEGREE, MAX_FILE_POINTS, MAX_KEYS, MAX_MAGNITUDE, MAX_NAME,
-    MAX_TABLES, MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
+    MAX_SOLIDS, MAX_TABLES, MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
     AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName, CurveForm,
@@ -109,7 +110,7 @@ pub fn load_model(path: &Path, sets: &[String]) -> Result<SceneModel, SceneError
         source,
     })?;
     match String::from_utf8(bytes) {
-        Ok(text) => parse_model(&text, format, &source_name, base_dir, sets),
+        Ok(text) => parse_shared(text.into(), format, &source_name, base_dir, sets),
         Err(error) => {
             let at = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes());
@@ -163,9 +164,20 @@ pub fn parse_model(
     base_dir: &Path,
     sets: &[String],
 ) -> Result<SceneModel, SceneError> {
+    parse_shared(text.into(), format, source_name, base_dir, sets)
+}
+
+/// As [`parse_model`], with a text that errors keep a share of.
+fn parse_shared(
+    text: Arc<str>,
+    format: SceneFormat,
+    source_name: &str,
+    base_dir: &Path,
+    sets: &[String],
+) -> Result<SceneModel, SceneError> {
     let mut sources = Sources::default();
     for (text, what) in
-        std::iter::once((text, source_name)).chain(sets.iter().map(|set| (set.as_str(), "--set")))
+        std::iter::once((&*text, source_name)).chain(sets.iter().map(|set| (set.as_str(), "--set")))
     {
         if text.len() > MAX_TEXT_BYTES {
             let source = sources.add(what.to_owned(), "".into(), false);
@@ -175,8 +187,8 @@ pub fn parse_model(
             return Err(sources.error(place, "", Some(found), &wanted, None));
         }
     }
-    let source = sources.add(source_name.to_owned(), text.into(), false);
-    let result = read_text(text, source, format, base_dir, sets, &mut sources);
+    let source = sources.add(source_name.to_owned(), Arc::clone(&text), false);
+    let result = read_text(&text, source, format, base_dir, sets, &mut sources);
     match result {
         Ok(mut model) => {
             model.sources = sources;

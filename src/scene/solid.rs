@@ -8,7 +8,7 @@ use super::fields::{
     length, name, number, string, tuple, vector,
 };
 use super::keys::{self, nearest};
-use super::limits::{MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE};
+use super::limits::{MAX_SOLIDS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE};
 use super::model::{
     AxisModel, Operation, PlaceStep, ProfileModel, SolidKind, SolidModel, TurnModel,
 };
@@ -27,6 +27,11 @@ pub(super) fn solids(value: &Value, context: &mut Context) -> Result<Vec<SolidMo
     let list = elements(value, wanted)?;
     if list.is_empty() {
         return Err(Fault::value(value.place, wanted));
+    }
+    if let Some(more) = list.get(MAX_SOLIDS) {
+        let wanted = format!("at most {MAX_SOLIDS} solids in a scene");
+        let found = format!("{} solids", list.len());
+        return Err(Fault::found(more.place, found, wanted).at_index(MAX_SOLIDS));
     }
     let found = each(list, |index, element| solid(element, index, context))?;
     // Of two solids of one name the later one is at fault, unless only the earlier one asked for it.

@@ -133,15 +133,17 @@ impl Table {
     fn into_kind(mut self) -> Kind {
         self.index = HashMap::new();
         self.slots.sort_by_key(|slot| slot.key_place);
-        let entries = self.slots.into_iter().map(|slot| Entry {
+        // A list of its own: that of the slots has room for more, and larger ones.
+        let mut entries = Vec::with_capacity(self.slots.len());
+        entries.extend(self.slots.into_iter().map(|slot| Entry {
             key: slot.key,
             key_place: slot.key_place,
             value: Value {
                 kind: slot.item.into_kind(),
                 place: slot.place,
             },
-        });
-        Kind::Table(entries.collect())
+        }));
+        Kind::Table(entries)
     }
 }
 
