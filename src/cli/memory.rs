@@ -14,7 +14,7 @@ use crate::error::Error;
 
 /// Program pages that are first touched later, what the allocator keeps beside what was asked for, and the stacks: 0.5 to 2 MiB
 /// were seen.
-const SPARE: u64 = 3 << 20;
+const SPARE: u64 = 4 << 20;
 /// A worker's stack, its arena and its short-lived buffers.
 const SPARE_PER_WORKER: u64 = 1 << 19;
 /// What a process is taken to have where the system does not tell.

@@ -229,7 +229,10 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         CompressionName::Pxr24 => Compression::Pxr24,
     };
     let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
-    let sampled = LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection);
+    let sampled =
+        LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection).saturating_add(
+            LayerSampler::bytes_of_division(scene.assembly(), &selection),
+        );
     let layer_bytes = layer_bytes(&grid, sampled, &channels, scalars.len(), compression);
     let stack_bytes = largest_stack_bytes(&grid, &channels);
     let plan = Plan {

@@ -100,7 +100,10 @@ pub fn bytes_per_worker(scene: &Scene, plan: &Plan) -> Result<u64, Error> {
     let mut most = 0;
     for &resolution in &plan.resolutions {
         let grid = at(scene, resolution).grid()?;
-        let each = LayerSampler::bytes_per_layer(scene.assembly(), &grid, &studied());
+        let each =
+            LayerSampler::bytes_per_layer(scene.assembly(), &grid, &studied()).saturating_add(
+                LayerSampler::bytes_of_division(scene.assembly(), &studied()),
+            );
         most = each.max(most);
     }
     Ok(most)

@@ -13,6 +13,9 @@ use crate::solid::{Assembly, Body, Part, Scalar};
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Bytes of the parts of one divided voxel: 20 000 of up to 1.2 kB.
+const DIVISION: u64 = 24 << 20;
+
 /// A quantity sampled on a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Channel {
@@ -230,6 +233,17 @@ impl<'a> LayerSampler<'a> {
                 * (1 + each(selection.fraction, 4)
                     + each(selection.sdf, 4)
                     + each(selection.material, 4))
+    }
+
+    /// Bytes that dividing a voxel takes, where several bodies may touch it and fractions are wanted: as many parts as
+    /// it may be divided into, of some kilobyte each.
+    #[must_use]
+    pub fn bytes_of_division(assembly: &Assembly, selection: &Selection) -> u64 {
+        if selection.fraction && assembly.single_index().is_none() {
+            DIVISION
+        } else {
+            0
+        }
     }
 
     /// Bytes that each thread takes beside [`bytes_per_layer`](Self::bytes_per_layer): the distances of a composite's

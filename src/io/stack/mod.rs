@@ -403,16 +403,23 @@ impl StackWriter {
     }
 }
 
-/// Bytes of a slice's header and its record in the manifest, with room to spare.
-const HEADER_AND_RECORD: u64 = 4096;
+/// Bytes of a slice's header but for its channels, with a name of the scene as long as it may be.
+const HEADER: u64 = 1088;
+/// Bytes of a channel's entry there, but for its name.
+const CHANNEL: u64 = 18;
+/// Bytes of a slice's record in the manifest.
+const RECORD: u64 = 224;
+/// Bytes of the rest of the manifest, but for a long scene.
+const MANIFEST: u64 = 4096;
 
 /// Bytes that a stack of these channels takes at most, to compare with
 /// [`available_bytes`](super::directory::available_bytes) before any work.
 #[must_use]
 pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
     largest_slice_bytes(grid, channels)
+        .saturating_add(RECORD)
         .saturating_mul(grid.dims()[2] as u64)
-        .saturating_add(HEADER_AND_RECORD)
+        .saturating_add(MANIFEST)
 }
 
 /// Bytes that one slice takes at most.
@@ -426,7 +433,8 @@ pub fn largest_slice_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
     nx.saturating_mul(pixel)
         .saturating_add(16)
         .saturating_mul(ny)
-        .saturating_add(HEADER_AND_RECORD)
+        .saturating_add(HEADER)
+        .saturating_add(channels.iter().map(|c| CHANNEL + c.name.len() as u64).sum())
 }
 
 fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {
