@@ -489,7 +489,8 @@ fn mutated(text: &str, random: &mut Random) -> String {
                 bytes.splice(at..at, part);
             }
             3 => {
-                let mark = b"[]{}\"'#=,.\n\r\t \\\0\xff<>/&-e"[random.below(25)];
+                let marks = b"[]{}\"'#=,.\n\r\t \\\0\xff<>/&-e";
+                let mark = marks[random.below(marks.len())];
                 bytes.insert(random.below(bytes.len() + 1), mark);
             }
             4 if random.below(4) == 0 => bytes.truncate(random.below(bytes.len() + 1)),
