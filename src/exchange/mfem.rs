@@ -29,6 +29,9 @@
 //!
 //! [`write()`] gives the first dialect with Cartesian points, so that all numbers read back bit for bit.
 //!
+//! Two ways of writing that other programs have are taken with a note: `dimensions` for `dimension` in a patch, and in a
+//! v1.0 mesh the word `spacing` with its parameters after a knot vector.
+//!
 //! * Units: those of the file.
 //! * Limits: meshes that are periodic by identified boundaries, not conforming, or have inactive
 //!   elements are refused. Factors of refinement (v1.1) are passed over: the geometry is the same.
@@ -106,7 +109,7 @@ pub fn read(text: &str) -> Result<Reading, ExchangeError> {
     match word.text {
         "patches" => read_patches(&mut scan, &topology, &mut reading)?,
         "knotvectors" => {
-            let knots = read_knot_vectors(&mut scan)?;
+            let knots = read_knot_vectors(&mut scan, refinable, &mut reading)?;
             if refinable {
                 skip_refinement(&mut scan, topology.parameters, knots.len(), &mut reading)?;
             }
@@ -218,23 +221,63 @@ fn read_element(scan: &mut Scanner<'_>, parameters: usize) -> Result<Element, Ex
     })
 }
 
-/// One knot vector: degree, number of control points, knots.
-fn read_knot_vector(scan: &mut Scanner<'_>, name: &str) -> Result<KnotVector, ExchangeError> {
+/// One knot vector: degree, number of control points, knots; how its spans are spaced is passed over.
+///
+/// * `section`: whether spacings have a section of their own, so that none follows here.
+fn read_knot_vector(
+    scan: &mut Scanner<'_>,
+    name: &str,
+    section: bool,
+    reading: &mut Reading,
+) -> Result<KnotVector, ExchangeError> {
     let at = scan.here();
     let degree = scan.count("the degree of a knot vector", 0)?;
     let count = scan.count("the number of control points of a knot vector", 1)?;
     let length = count.saturating_add(degree).saturating_add(1);
     let knots = scan.numbers(length, |i| format!("knot {i}"))?;
-    knot_vector(degree, knots, name, || scan.place(at))
+    let knots = knot_vector(degree, knots, name, || scan.place(at))?;
+    // A v1.1 mesh has a section of that name after its knot vectors.
+    if let Some(word) = scan.peek()
+        && word.text == "spacing"
+        && !section
+    {
+        scan.next();
+        skip_spacing(scan)?;
+        reading.note(
+            || scan.place(word.at),
+            || format!("the spacing of {name} is passed over; it does not change the geometry"),
+        );
+    }
+    Ok(knots)
 }
 
-fn read_knot_vectors(scan: &mut Scanner<'_>) -> Result<Vec<KnotVector>, ExchangeError> {
+fn read_knot_vectors(
+    scan: &mut Scanner<'_>,
+    section: bool,
+    reading: &mut Reading,
+) -> Result<Vec<KnotVector>, ExchangeError> {
     let count = scan.count("the number of knot vectors", 1)?;
     let mut knots = Vec::new();
     for index in 0..count {
-        knots.push(read_knot_vector(scan, &format!("knot vector {index}"))?);
+        knots.push(read_knot_vector(
+            scan,
+            &format!("knot vector {index}"),
+            section,
+            reading,
+        )?);
     }
     Ok(knots)
+}
+
+/// Kind and parameters of how the spans of a knot vector are spaced.
+fn skip_spacing(scan: &mut Scanner<'_>) -> Result<(), ExchangeError> {
+    scan.count("a kind of spacing", 0)?;
+    let integers = scan.count("a number of whole parameters", 0)?;
+    let reals = scan.count("a number of real parameters", 0)?;
+    scan.numbers(integers.saturating_add(reals), |i| {
+        format!("parameter {i} of a spacing")
+    })?;
+    Ok(())
 }
 
 /// How a mesh is to be refined does not change what it is.
@@ -264,12 +307,7 @@ fn skip_refinement(
     let count = scan.count("the number of spacings", 0)?;
     for _ in 0..count {
         scan.count("a knot vector", 0)?;
-        scan.count("a kind of spacing", 0)?;
-        let integers = scan.count("a number of whole parameters", 0)?;
-        let reals = scan.count("a number of real parameters", 0)?;
-        scan.numbers(integers.saturating_add(reals), |i| {
-            format!("parameter {i} of a spacing")
-        })?;
+        skip_spacing(scan)?;
     }
     reading.note(
         || scan.place(at),
@@ -319,9 +357,17 @@ fn read_patch(
     let mut knots = Vec::new();
     for direction in 0..parameters {
         let name = format!("knot vector of {}", parameter(direction));
-        knots.push(read_knot_vector(scan, &name)?);
+        knots.push(read_knot_vector(scan, &name, false, reading)?);
     }
-    scan.keyword("dimension")?;
+    let word = scan.word("the word \"dimension\"")?;
+    match word.text {
+        "dimension" => {}
+        "dimensions" => reading.note(
+            || scan.place(word.at),
+            || "\"dimensions\" is taken for \"dimension\"".into(),
+        ),
+        _ => return Err(scan.unexpected(word, "the word \"dimension\"")),
+    }
     let dimension = small(scan.integer("the number of coordinates of a point", 2..=3)?);
     let wanted = "controlpoints, controlpoints_homogeneous or controlpoints_cartesian";
     let word = scan.word(wanted)?;

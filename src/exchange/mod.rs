@@ -177,6 +177,39 @@ impl Reading {
         });
     }
 
+    /// The volumes; a note tells what else there is.
+    ///
+    /// # Errors
+    /// [`ExchangeError::Unexpected`] where there is none.
+    pub(crate) fn into_volumes(mut self) -> Result<(Vec<NurbsVolume>, Vec<String>), ExchangeError> {
+        let (mut volumes, mut rest) = (Vec::new(), Vec::new());
+        for spline in self.splines {
+            match spline {
+                Spline::Volume(volume) => volumes.push(volume),
+                other => rest.push(other.kind()),
+            }
+        }
+        let Some(first) = rest.first() else {
+            return Ok((volumes, self.notes));
+        };
+        if volumes.is_empty() {
+            return Err(ExchangeError::Unexpected {
+                place: Place::Spline(0),
+                found: format!("a {first}"),
+                wanted: "at least one volume in the file".into(),
+            });
+        }
+        let count = |kind: &str| match rest.iter().filter(|k| **k == kind).count() {
+            0 => None,
+            1 => Some(format!("one {kind}")),
+            n => Some(format!("{n} {kind}s")),
+        };
+        let rest: Vec<String> = ["curve", "surface"].into_iter().filter_map(count).collect();
+        let said = format!("only the volumes are read; left out: {}", rest.join(", "));
+        self.notes.push(said);
+        Ok((volumes, self.notes))
+    }
+
     /// The splines, all of which must be of one kind.
     ///
     /// * `pick`: the spline itself, or none where it is of another kind.
@@ -326,10 +359,10 @@ fn read_only<T>(
         .map_err(|error| error.in_file(path))
 }
 
-/// The volumes of a file that holds nothing else.
+/// The volumes of a file; what else it holds is left out, with a warning.
 ///
 /// # Errors
-/// Those of [`read`]; [`ExchangeError::Unexpected`] where a spline is no volume.
+/// Those of [`read`]; [`ExchangeError::Unexpected`] where there is no volume.
 ///
 /// ```
 /// # use voxlathe::exchange;
@@ -343,10 +376,14 @@ fn read_only<T>(
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_volumes(path: impl AsRef<Path>) -> Result<Vec<NurbsVolume>, ExchangeError> {
-    read_only(path.as_ref(), "volume", |spline| match spline {
-        Spline::Volume(volume) => Some(volume),
-        _ => None,
-    })
+    let path = path.as_ref();
+    let (volumes, notes) = read(path)?
+        .into_volumes()
+        .map_err(|error| error.in_file(path))?;
+    for note in &notes {
+        tracing::warn!("{}: {note}", path.display());
+    }
+    Ok(volumes)
 }
 
 /// The surfaces of a file that holds nothing else.
