@@ -197,7 +197,7 @@ pub(super) struct Query {
     /// The scene: TOML, JSON by its ending, or - for TOML on standard input
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
-    /// Points: .csv (x,y,z on a line) or .npy (float64, shape (n, 3))
+    /// Points: .csv (x,y,z on a line), .npy (float64, shape (n, 3)) or - for .csv on standard input
     #[arg(long, value_name = "FILE")]
     pub(super) points: PathBuf,
     /// File to write, .csv or .npy

@@ -10,7 +10,11 @@ use crate::scene::Scene;
 use clap::ValueEnum;
 use rayon::prelude::*;
 use serde_json::json;
+use std::path::Path;
 use std::process::ExitCode;
+
+/// What stands for standard input.
+const STDIN: &str = "-";
 
 /// Points between two looks at the interrupt flag.
 const CHUNK: usize = 4096;
@@ -20,6 +24,14 @@ pub(super) fn run(
     common: &Common,
     console: &Console,
 ) -> Result<ExitCode, Failure> {
+    if [&arguments.scene, &arguments.points]
+        .into_iter()
+        .all(|p| p == Path::new(STDIN))
+    {
+        return Err(Failure::usage(
+            "the scene and --points are both -; standard input holds one of them".to_owned(),
+        ));
+    }
     let scene = Scene::load_with(&arguments.scene, &common.set)?;
     for warning in scene.warnings() {
         console.warn(warning);
@@ -37,7 +49,11 @@ pub(super) fn run(
     if let Some(path) = &arguments.output {
         points::check_table_name(path)?;
     }
-    let points = points::read_points(&arguments.points)?;
+    let points = if arguments.points == Path::new(STDIN) {
+        points::read_csv_points("<stdin>", std::io::stdin().lock())?
+    } else {
+        points::read_points(&arguments.points)?
+    };
     let bar = console.bar(points.len() as u64, "points");
     let solid = scene.assembly();
     let answers = points

@@ -1,7 +1,7 @@
 //! Points in, columns of results out: `.csv` and `.npy`.
 //!
-//! * `.csv`: one point a line, `x, y, z` with commas or blanks between; an optional header line of
-//!   names; what follows `#` is a comment. Results have a header line and the shortest digits that
+//! * `.csv`: one point a line, `x, y, z` with commas or blanks between, in double quotes or not; an optional header
+//!   line of names; what follows `#` is a comment. Results have a header line and the shortest digits that
 //!   give the same f64.
 //! * `.npy`: little-endian float64 (float32 is widened) of shape (n, 3), in C or Fortran order,
 //!   format versions 1 to 3. Results are float64 of shape (n, columns) in C order.
@@ -69,6 +69,26 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<DVec3>, IoError> {
     }
 }
 
+/// The points of a `.csv` that comes from elsewhere than a file.
+///
+/// * `name`: what it is called in errors.
+///
+/// # Errors
+/// Those of [`read_points`] for a `.csv`.
+///
+/// ```
+/// # use voxlathe::io::points::read_csv_points;
+/// let found = read_csv_points("<stdin>", "x,y,z\n1,2,3\n".as_bytes())?;
+/// assert_eq!(found, [glam::DVec3::new(1.0, 2.0, 3.0)]);
+/// # Ok::<(), voxlathe::io::IoError>(())
+/// ```
+pub fn read_csv_points(
+    name: impl AsRef<Path>,
+    reader: impl BufRead,
+) -> Result<Vec<DVec3>, IoError> {
+    read_csv(name.as_ref(), reader, MAX_POINTS)
+}
+
 /// A field and its column in characters, from 1.
 type Field<'a> = (usize, &'a str);
 
@@ -103,6 +123,12 @@ fn fields(line: &str) -> Vec<Field<'_>> {
             return found;
         }
     }
+}
+
+/// A field without the double quotes that programs of tables put even numbers in.
+fn unquoted(field: &str) -> &str {
+    let inner = field.strip_prefix('"').and_then(|f| f.strip_suffix('"'));
+    inner.unwrap_or(field)
 }
 
 fn read_csv(path: &Path, mut reader: impl BufRead, most: usize) -> Result<Vec<DVec3>, IoError> {
@@ -149,7 +175,7 @@ fn read_csv(path: &Path, mut reader: impl BufRead, most: usize) -> Result<Vec<DV
                 && !field.starts_with(|c: char| c.is_ascii_digit())
         };
         let is_header =
-            header_allowed && fields.len() == 3 && fields.iter().all(|(_, field)| is_name(field));
+            header_allowed && fields.len() == 3 && fields.iter().all(|f| is_name(unquoted(f.1)));
         header_allowed = false;
         if is_header {
             continue;
@@ -160,7 +186,7 @@ fn read_csv(path: &Path, mut reader: impl BufRead, most: usize) -> Result<Vec<DV
                 let end = text.trim_end().chars().count() + 1;
                 return refuse(end, "", "three numbers are wanted");
             };
-            *value = match field.parse::<f64>() {
+            *value = match unquoted(field).parse::<f64>() {
                 Ok(value) if value.is_finite() => value,
                 Ok(_) => return refuse(column, field, "a finite number is wanted"),
                 Err(_) => return refuse(column, field, "a number is wanted"),
@@ -463,6 +489,7 @@ mod tests {
             "x,y,z\n1, -2.5 ,3e-7\r\n4\t5 6",
             "\u{feff}# made by hand\n\n  x y z # names\n1 -2.5 3e-7 # first\n\t4 , 5,\t6  \n# end",
             "\"x\",\"y\",\"z\"\n+1,-2.5,0.3e-6\n4.0,5.,6\n",
+            "\"1\",\"-2.5\",\"3e-7\"\n4,\"5\",6\n",
         ] {
             assert_eq!(csv(text).as_ref(), Ok(&wanted), "{text:?}");
         }
