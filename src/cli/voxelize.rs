@@ -75,6 +75,9 @@ pub(super) fn run(
     // The tables are there: what is missing is known.
     plan.layer_bytes = (plan.layer_bytes).saturating_add(sampler.bytes_per_thread());
     plan.workers = plan.room()?;
+    if let Some(warning) = scene.grid_warning(&plan.grid) {
+        console.warn(&warning);
+    }
     let prepare = start.elapsed().as_secs_f64();
     tracing::debug!(dims = ?plan.grid.dims(), workers = plan.workers, layer_bytes = plan.layer_bytes, "planned");
     if arguments.dry_run {
@@ -503,9 +506,12 @@ fn is_empty(scene: &Scene) -> bool {
     scene.exact_volume() == Some(0.0)
 }
 
-fn warnings(scene: &Scene) -> Vec<String> {
+fn warnings(scene: &Scene, plan: &Plan) -> Vec<String> {
     let nothing = is_empty(scene).then(|| NOTHING_LEFT.to_owned());
-    scene.warnings().iter().cloned().chain(nothing).collect()
+    let said = scene.warnings().iter().cloned();
+    said.chain(scene.grid_warning(&plan.grid))
+        .chain(nothing)
+        .collect()
 }
 
 fn operation_name(operation: Operation) -> &'static str {
@@ -579,7 +585,7 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         volume_exact: scene.exact_volume(),
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
-        warnings: warnings(scene),
+        warnings: warnings(scene, plan),
         material_volumes: material_volumes(scene, plan, tally),
         certainty: if plan.selection.sdf {
             certainty(&tally.certainty)
@@ -618,7 +624,7 @@ fn document(
         "volume_exact": scene.exact_volume(),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": memory::peak(),
-        "warnings": warnings(scene),
+        "warnings": warnings(scene, plan),
     })
 }
 

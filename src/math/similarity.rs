@@ -159,6 +159,37 @@ impl Similarity {
         ))
     }
 
+    /// Follows this map by the reflection in the plane through the world origin with that `normal`, after a reflection
+    /// of the local y: two reflections are a rotation, so the frame stays right-handed, and what it places has to be
+    /// reflected in its own y beforehand. `None` when the normal is zero.
+    #[must_use]
+    pub fn reflected(&self, normal: DVec3) -> Option<Self> {
+        let largest = normal.abs().max_element();
+        if !(largest > 0.0 && largest.is_finite()) {
+            return None;
+        }
+        let power = (-largest.log2().floor()).exp2();
+        let n = (normal * power).to_array().map(Dd::of);
+        let square = dot(n, n);
+        let lone = n.iter().filter(|c| **c != Dd::ZERO).count() == 1;
+        let reflect = |v: DdVec| -> DdVec {
+            // Not divided before it is multiplied, a normal such as (1, 1, 0) leaves no rounding.
+            let twice = Dd::of(2.0) * dot(n, v);
+            std::array::from_fn(|i| {
+                if n[i] == Dd::ZERO {
+                    v[i]
+                } else if lone {
+                    -v[i]
+                } else {
+                    v[i] - twice * n[i] / square
+                }
+            })
+        };
+        let [x, y, z] = self.columns.map(reflect);
+        let columns = [x, y.map(|c| -c), z];
+        Some(Self::new(columns, reflect(self.origin), self.scale))
+    }
+
     /// The scale factor.
     #[must_use]
     pub fn scale(&self) -> f64 {
@@ -327,6 +358,34 @@ mod tests {
             .expect("valid");
         assert_eq!(turned.to_local(p).error, DVec3::ZERO);
         assert_eq!(turned.axis(2), DVec3::Y);
+    }
+
+    #[test]
+    fn reflections_keep_frames_right_handed_and_twice_is_nothing() {
+        let frame =
+            Similarity::from_axis(DVec3::new(1.0, -2.0, 0.5), DVec3::Z, DVec3::X).expect("valid");
+        for normal in [DVec3::X, DVec3::Z * -4.0, DVec3::new(1.0, -1.0, 0.0)] {
+            let image = frame.reflected(normal).expect("a normal");
+            let n = normal.normalize();
+            let reflect = |v: DVec3| v - 2.0 * n.dot(v) * n;
+            for i in [0, 2] {
+                assert!((image.axis(i) - reflect(frame.axis(i))).length() < 1e-15);
+            }
+            assert!((image.axis(1) + reflect(frame.axis(1))).length() < 1e-15);
+            assert!((image.axis(0).cross(image.axis(1)) - image.axis(2)).length() < 1e-15);
+            assert!((image.origin() - reflect(frame.origin())).length() < 1e-15);
+            // Along axes and diagonals nothing is rounded.
+            assert_eq!(
+                image.to_local(DVec3::new(0.25, 3.0, -1.0)).error,
+                DVec3::ZERO
+            );
+            assert_eq!(image.reflected(normal).as_ref(), Some(&frame));
+        }
+        let skew = DVec3::new(0.3, -2.0, 1.1);
+        let twice = frame.reflected(skew).and_then(|f| f.reflected(skew));
+        let off = twice.expect("a normal").axis(0) - frame.axis(0);
+        assert!(off.length() < 1e-16);
+        assert!(frame.reflected(DVec3::ZERO).is_none());
     }
 
     #[test]

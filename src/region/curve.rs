@@ -4,9 +4,9 @@
 //! interpolating curve or the control points of a knot span are irrational or rounded numbers in
 //! f64, and the solid is that of the numbers in the scene, not of their roundings.
 //!
-//! Source: Piegl & Tiller, *The NURBS Book*, 2nd ed.: blossoms and Bézier extraction §5.6, arcs
-//! §7.3, interpolation §9.2.1 (equations 9.5 and 9.8).
+//! Source: Piegl & Tiller, *The NURBS Book*, 2nd ed.: blossoms and Bézier extraction §5.6, arcs §7.3.
 
+use super::interpolate::{self, Ends};
 use crate::math::{Dd, Real};
 
 /// A curve of the meridian half-plane, coordinates (r, z) in scene units.
@@ -16,7 +16,7 @@ pub enum ProfileCurve {
     Nurbs {
         /// Degree d.
         degree: usize,
-        /// n + d + 2 knots, non-decreasing, interior multiplicity at most d.
+        /// n + d + 2 knots, non-decreasing; where d + 1 of them inside are equal, the curve falls into two.
         knots: Vec<f64>,
         /// n + 1 control points.
         points: Vec<[f64; 2]>,
@@ -41,12 +41,15 @@ pub enum ProfileCurve {
         /// End angle in degrees, at most a turn away.
         to: f64,
     },
-    /// The clamped curve through the points: chord-length parameters, knots by averaging.
+    /// The spline through the points, with chord-length parameters.
     Interpolate {
-        /// At least two points, no two consecutive ones equal.
+        /// At least two points, of a closed one three, no two consecutive ones equal.
         points: Vec<[f64; 2]>,
-        /// Degree, reduced to the number of points less one where there are few.
+        /// Degree; of an open one reduced to the number of points and tangents less one where there are few, of a
+        /// closed one odd.
         degree: usize,
+        /// Whether and how it ends.
+        ends: Ends,
     },
     /// A curve run backwards.
     Reversed(Box<ProfileCurve>),
@@ -76,12 +79,33 @@ impl Bezier {
     }
 }
 
-fn exact(p: [f64; 2]) -> [Dd; 2] {
+pub(super) fn exact(p: [f64; 2]) -> [Dd; 2] {
     p.map(Dd::of)
 }
 
-/// The Bézier pieces of a curve, head to tail; neighbours share their end points to the last bit.
+/// Parameters inside a curve at which it falls into two, since as many knots as a clamped end has are equal there.
+pub(crate) fn breaks(curve: &ProfileCurve) -> Vec<f64> {
+    match curve {
+        ProfileCurve::Nurbs {
+            degree,
+            knots,
+            points,
+            ..
+        } => (degree + 1..points.len())
+            .filter(|&i| {
+                let ends = [knots.get(*degree), knots.get(points.len())];
+                knots.get(i) == knots.get(i - degree) && !ends.contains(&knots.get(i))
+            })
+            .map(|i| knots[i])
+            .collect(),
+        ProfileCurve::Reversed(inner) => breaks(inner),
+        _ => Vec::new(),
+    }
+}
+
+/// The Bézier pieces of a curve, head to tail; but for [`breaks`], neighbours share their end points to the last bit.
 pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
+    let breaks = breaks(curve);
     let mut pieces = match curve {
         ProfileCurve::Nurbs {
             degree,
@@ -125,7 +149,11 @@ pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
             from,
             to,
         } => arc(*center, *radii, *tilt, *from, *to)?,
-        ProfileCurve::Interpolate { points, degree } => interpolate(points, *degree)?,
+        ProfileCurve::Interpolate {
+            points,
+            degree,
+            ends,
+        } => interpolate::pieces(points, *degree, *ends)?,
         ProfileCurve::Reversed(inner) => {
             let mut pieces = beziers(inner)?;
             pieces.reverse();
@@ -137,6 +165,9 @@ pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
         }
     };
     for i in 1..pieces.len() {
+        if breaks.contains(&pieces[i].interval[0]) {
+            continue;
+        }
         let joint = *pieces[i - 1].points.last().expect("a piece has points");
         let next = &mut pieces[i].points[0];
         // The two spans agree on their joint in exact arithmetic, up to a common factor.
@@ -151,7 +182,7 @@ pub(crate) fn beziers(curve: &ProfileCurve) -> Result<Vec<Bezier>, String> {
 }
 
 /// Bézier pieces of the non-empty knot spans, each control point a blossom value.
-fn extract(degree: usize, knots: &[Dd], points: &[HomogeneousPoint]) -> Vec<Bezier> {
+pub(super) fn extract(degree: usize, knots: &[Dd], points: &[HomogeneousPoint]) -> Vec<Bezier> {
     let mut pieces = Vec::new();
     for span in degree..points.len() {
         let (a, b) = (knots[span], knots[span + 1]);
@@ -251,135 +282,6 @@ fn arc(
     Ok(pieces)
 }
 
-/// Basis functions that do not vanish on a span, in double-double.
-fn basis(degree: usize, knots: &[Dd], span: usize, u: Dd) -> Vec<Dd> {
-    let mut values = vec![Dd::ONE];
-    for j in 1..=degree {
-        let mut saved = Dd::ZERO;
-        for r in 0..j {
-            let right = knots[span + r + 1] - u;
-            let left = u - knots[span + 1 + r - j];
-            let t = values[r] / (right + left);
-            values[r] = saved + right * t;
-            saved = left * t;
-        }
-        values.push(saved);
-    }
-    values
-}
-
-fn interpolate(points: &[[f64; 2]], degree: usize) -> Result<Vec<Bezier>, String> {
-    let n = points.len();
-    if n < 2 {
-        return Err(format!(
-            "has {n} points; an interpolating curve needs at least 2"
-        ));
-    }
-    if degree == 0 {
-        return Err("has degree 0; the degree must be at least 1".into());
-    }
-    let degree = degree.min(n - 1);
-    // Chord-length parameters on [0, 1].
-    let mut parameters = vec![Dd::ZERO];
-    let mut length = Dd::ZERO;
-    for i in 1..n {
-        let d = [0, 1].map(|c| Dd::sum(points[i][c], -points[i - 1][c]));
-        let largest = d[0].f64().abs().max(d[1].f64().abs());
-        if largest == 0.0 {
-            return Err(format!(
-                "has equal points {} and {i}, ({}, {}); consecutive points must differ",
-                i - 1,
-                points[i][0],
-                points[i][1]
-            ));
-        }
-        let power = (-largest.log2().floor()).exp2();
-        let d = d.map(|c| c.scale_by_power_of_two(power));
-        length = length
-            + (d[0] * d[0] + d[1] * d[1])
-                .sqrt()
-                .scale_by_power_of_two(1.0 / power);
-        parameters.push(length);
-    }
-    for u in &mut parameters {
-        *u = *u / length;
-    }
-    parameters[n - 1] = Dd::ONE;
-    let mut knots = vec![Dd::ZERO; degree + 1];
-    #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
-    for j in 1..n - degree {
-        let total = parameters[j..j + degree]
-            .iter()
-            .fold(Dd::ZERO, |s, &u| s + u);
-        knots.push(total / Dd::of(degree as f64));
-    }
-    knots.extend(std::iter::repeat_n(Dd::ONE, degree + 1));
-
-    // Collocation at increasing sites is totally positive: banded elimination without pivoting is
-    // stable (de Boor & Pinkus 1977).
-    let mut rows: Vec<(usize, Vec<Dd>)> = Vec::with_capacity(n);
-    let mut span = degree;
-    for (k, &u) in parameters.iter().enumerate() {
-        while span < n - 1 && u >= knots[span + 1] {
-            span += 1;
-        }
-        let values = if k == 0 || k == n - 1 {
-            let mut row = vec![Dd::ZERO; degree + 1];
-            row[if k == 0 { 0 } else { degree }] = Dd::ONE;
-            row
-        } else {
-            basis(degree, &knots, span, u)
-        };
-        rows.push((span - degree, values));
-    }
-    let mut right: Vec<[Dd; 2]> = points.iter().copied().map(exact).collect();
-    for k in 0..n {
-        let (first, pivot_row) = (rows[k].0, rows[k].1.clone());
-        let Some(&pivot) = pivot_row.get(k.wrapping_sub(first)) else {
-            return Err("has points too unevenly spaced to interpolate".into());
-        };
-        if pivot == Dd::ZERO {
-            return Err("has points too unevenly spaced to interpolate".into());
-        }
-        for m in k + 1..(k + degree + 1).min(n) {
-            let start = rows[m].0;
-            if start > k {
-                break;
-            }
-            let factor = rows[m].1[k - start] / pivot;
-            if factor == Dd::ZERO {
-                continue;
-            }
-            for (offset, &value) in pivot_row.iter().enumerate() {
-                let column = first + offset;
-                if column >= k && column >= start && column - start < rows[m].1.len() {
-                    rows[m].1[column - start] = rows[m].1[column - start] - factor * value;
-                }
-            }
-            for c in 0..2 {
-                right[m][c] = right[m][c] - factor * right[k][c];
-            }
-        }
-    }
-    for k in (0..n).rev() {
-        let (first, row) = (rows[k].0, rows[k].1.clone());
-        for c in 0..2 {
-            let mut value = right[k][c];
-            for (offset, &factor) in row.iter().enumerate() {
-                let column = first + offset;
-                if column > k {
-                    value = value - factor * right[column][c];
-                }
-            }
-            right[k][c] = value / row[k - first];
-        }
-    }
-    right[0] = exact(points[0]);
-    right[n - 1] = exact(points[n - 1]);
-    let control: Vec<HomogeneousPoint> = right.iter().map(|p| [p[0], p[1], Dd::ONE]).collect();
-    Ok(extract(degree, &knots, &control))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -441,6 +343,7 @@ mod tests {
             let pieces = beziers(&ProfileCurve::Interpolate {
                 points: points.clone(),
                 degree,
+                ends: Ends::FREE,
             })
             .expect("a curve");
             let ends: Vec<[Dd; 2]> = pieces.iter().map(|b| at(b, 0.0)).collect();

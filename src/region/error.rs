@@ -29,6 +29,25 @@ pub enum RegionError {
         /// The largest gap that is closed.
         allowed: f64,
     },
+    /// A curve jumps inside, where as many of its knots are equal as at a clamped end.
+    #[error(
+        "curve {curve} jumps by {gap:e} at parameter {parameter}, from (r, z) = ({}, {}); a jump of at most {allowed:e} is closed by a segment",
+        at[0], at[1]
+    )]
+    Jump {
+        /// Which loop.
+        loop_index: usize,
+        /// Which curve.
+        curve: usize,
+        /// The knot.
+        parameter: f64,
+        /// How far it jumps, in scene units.
+        gap: f64,
+        /// From where.
+        at: [f64; 2],
+        /// The widest jump that is closed.
+        allowed: f64,
+    },
     /// A curve crosses the axis.
     #[error(
         "curve {curve} reaches r = {r:e} at parameter {parameter}; r must not fall below {allowed:e}"
@@ -79,6 +98,9 @@ impl RegionError {
                 loop_index, next, ..
             } => Some((*loop_index, Some(*next))),
             Self::BelowAxis {
+                loop_index, curve, ..
+            }
+            | Self::Jump {
                 loop_index, curve, ..
             }
             | Self::Curve {

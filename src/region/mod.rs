@@ -24,6 +24,7 @@ mod eights;
 mod error;
 mod field;
 mod field_nodes;
+mod interpolate;
 mod mirror;
 mod moments;
 mod open_cells;
@@ -43,7 +44,8 @@ pub use crossings::Winding;
 pub use curve::ProfileCurve;
 pub use distance::DistanceSet;
 pub use error::RegionError;
-pub use profile::{Boundary, Fill, ProfileLoop, Region};
+pub use interpolate::Ends;
+pub use profile::{Across, Boundary, Fill, MAX_GAP, ProfileLoop, Region, Rules};
 
 pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
 pub(crate) use cells::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};

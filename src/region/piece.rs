@@ -483,11 +483,13 @@ pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
         let scale = bernstein::magnitude(c) * bernstein::magnitude(&w);
         parameters.extend(bernstein::sign_change_parameters(&turning, scale));
     }
+    let mut crossings: Vec<Dd> = Vec::new();
     if r.iter().any(|x| *x < Dd::ZERO) {
-        parameters.extend(bernstein::sign_change_parameters(
+        crossings.extend(bernstein::sign_change_parameters(
             &r,
             bernstein::magnitude(&r),
         ));
+        parameters.extend_from_slice(&crossings);
     }
     parameters.sort_by(|a, b| a.partial_cmp(b).expect("parameters are numbers"));
     // Cuts closer than this would leave pieces that double-double cannot evaluate usefully.
@@ -513,7 +515,10 @@ pub(crate) fn cuts(bezier: &Bezier) -> Vec<(Dd, [Dd; 2])> {
                     bernstein::evaluate(&w, t),
                 ]
             };
-            (t, [a / c, b / c])
+            // Where the curve crosses the axis it is on it, whatever rounding leaves.
+            let crosses = (a / c).f64().abs() < merge && crossings.contains(&t);
+            let r = if crosses { Dd::ZERO } else { a / c };
+            (t, [r, b / c])
         })
         .collect()
 }

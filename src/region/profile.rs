@@ -4,12 +4,13 @@
 //! laid on it, and everything scaled by a power of two into the unit square, so that a scene and
 //! the same scene times 2^20 take the same branches to the last bit.
 
-use super::boundary::{self, BoundaryPiece};
+use super::boundary::{self, BoundaryPiece, FilledBoundary};
 use super::crossings::Winding;
 use super::curve::{self, Bezier, ProfileCurve};
 use super::error::RegionError;
 use super::piece::{self, Piece, TABLE};
 use super::section::Section;
+use super::weld::welded;
 use crate::math::Side;
 use crate::math::tolerance::{BELOW_AXIS, GAP};
 use crate::math::{Dd, Real};
@@ -50,6 +51,46 @@ impl Fill {
     }
 }
 
+/// What becomes of curves that reach over the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Across {
+    /// They are refused.
+    #[default]
+    Refuse,
+    /// The region is what of theirs lies at r >= 0.
+    Clip,
+    /// The region is that, and what of their mirror image in the axis lies at r >= 0: what a whole turn of theirs sweeps.
+    Mirror,
+}
+
+/// The largest [`Rules::gap`]: wider ones are no slips of writing.
+pub const MAX_GAP: f64 = 1e-3;
+
+/// How curves become a region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rules {
+    /// How the first loop bounds it.
+    pub boundary: Boundary,
+    /// How several loops combine.
+    pub fill: Fill,
+    /// Share of the size of all curves together up to which a gap between consecutive curves is closed by a segment, from
+    /// 0 to [`MAX_GAP`]; the curves stay as they are.
+    pub gap: f64,
+    /// What becomes of curves that reach over the axis.
+    pub across: Across,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self {
+            boundary: Boundary::default(),
+            fill: Fill::default(),
+            gap: GAP,
+            across: Across::default(),
+        }
+    }
+}
+
 /// A closed region of the meridian half-plane, r >= 0.
 ///
 /// Lengths of every method are in the region's own [`unit`](Self::unit), in which all
@@ -65,7 +106,92 @@ pub struct Region {
 
 /// A loop of pieces in scene units, before scaling.
 struct Chain {
-    pieces: Vec<(Bezier, usize)>,
+    pieces: Vec<Link>,
+}
+
+/// One piece of a loop.
+struct Link {
+    bezier: Bezier,
+    /// Which curve of the loop it is of.
+    curve: usize,
+    /// Whether the curve may jump where the piece ends.
+    breaks: bool,
+}
+
+impl Chain {
+    /// Its image on the other side of the axis.
+    fn mirrored(&self) -> Self {
+        let mirrored = |link: &Link| {
+            let mut bezier = link.bezier.clone();
+            for point in &mut bezier.points {
+                point[0] = -point[0];
+            }
+            if let Some((centre, _)) = &mut bezier.circle {
+                centre[0] = -centre[0];
+            }
+            Link { bezier, ..*link }
+        };
+        Self {
+            pieces: self.pieces.iter().map(mirrored).collect(),
+        }
+    }
+}
+
+/// What pieces bound.
+struct Outline {
+    section: Section,
+    boundary: Vec<BoundaryPiece>,
+    crossing: Option<[f64; 2]>,
+}
+
+impl Outline {
+    /// What the fill rule makes of pieces.
+    fn of(pieces: Vec<Piece>, fill: Fill) -> Result<Self, RegionError> {
+        let found = filled(&pieces, &|w| fill.is_inside(w[0]), &|_| 0, 1)?;
+        Ok(Self {
+            section: Section::new(pieces, fill, &found.pieces),
+            boundary: found.pieces,
+            crossing: found.crossing,
+        })
+    }
+
+    /// The union of what the fill rule makes of each.
+    fn of_both(mut pieces: Vec<Piece>, image: Vec<Piece>, fill: Fill) -> Result<Self, RegionError> {
+        let one = |w: &[Winding]| fill.is_inside(w[0]);
+        // Where a curve crosses its image is no slip.
+        let crossing = filled(&pieces, &one, &|_| 0, 1)?.crossing;
+        let crossing = crossing.or(filled(&image, &one, &|_| 0, 1)?.crossing);
+        let count = pieces.len();
+        pieces.extend(image);
+        let either = |w: &[Winding]| fill.is_inside(w[0]) || fill.is_inside(w[1]);
+        let found = filled(&pieces, &either, &|i| usize::from(i >= count), 2)?;
+        let tangle = RegionError::Tangle {
+            limit: boundary::MOST_MEETINGS,
+        };
+        let boundary = welded(found.pieces, 2.0 * boundary::SAME_PROFILE).ok_or(tangle)?;
+        Ok(Self {
+            section: Section::enclosed(&boundary),
+            boundary,
+            crossing,
+        })
+    }
+}
+
+/// The boundary of what `inside` accepts of one profile's pieces.
+fn filled(
+    pieces: &[Piece],
+    inside: &dyn Fn(&[Winding]) -> bool,
+    operand: &dyn Fn(usize) -> usize,
+    operands: usize,
+) -> Result<FilledBoundary, RegionError> {
+    let found =
+        boundary::filled_boundary(pieces, inside, operand, operands, boundary::SAME_PROFILE);
+    if found.meetings > boundary::MOST_MEETINGS {
+        return Err(RegionError::Tangle {
+            limit: boundary::MOST_MEETINGS,
+        });
+    }
+    Ok(found)
 }
 
 impl Region {
@@ -86,6 +212,31 @@ impl Region {
     /// # Ok::<(), voxlathe::region::RegionError>(())
     /// ```
     pub fn new(loops: &[ProfileLoop], boundary: Boundary, fill: Fill) -> Result<Self, RegionError> {
+        let rules = Rules {
+            boundary,
+            fill,
+            ..Rules::default()
+        };
+        Self::with_rules(loops, &rules)
+    }
+
+    /// The region that the loops bound by those rules.
+    ///
+    /// With [`Boundary::ToAxis`] the first loop is the open chain and the others are closed.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new); curves that cross the axis only with [`Across::Refuse`].
+    ///
+    /// ```
+    /// use voxlathe::region::{Across, ProfileCurve, Region, Rules};
+    /// let circle = ProfileCurve::Arc { center: [0.5, 0.0], radii: [1.0; 2], tilt: 0.0, from: 0.0, to: 360.0 };
+    /// let clip = Rules { across: Across::Clip, ..Rules::default() };
+    /// let region = Region::with_rules(&[vec![circle.clone()]], &clip)?;
+    /// assert!(region.contains(0.0, 0.8 / region.unit()));
+    /// assert!(Region::with_rules(&[vec![circle]], &Rules::default()).is_err());
+    /// # Ok::<(), voxlathe::region::RegionError>(())
+    /// ```
+    pub fn with_rules(loops: &[ProfileLoop], rules: &Rules) -> Result<Self, RegionError> {
         if loops.is_empty() {
             return Err(RegionError::Empty { loop_index: 0 });
         }
@@ -94,82 +245,45 @@ impl Region {
             .enumerate()
             .map(|(i, l)| chain(i, l))
             .collect::<Result<Vec<_>, _>>()?;
-        // The unit comes from control points: it only has to bring the numbers near 1.
-        let reach = chains
-            .iter()
-            .flat_map(|c| &c.pieces)
-            .flat_map(|(b, _)| &b.points);
-        let reach = reach.fold(0.0_f64, |m, p| {
-            m.max((p[0] / p[2]).f64().abs())
-                .max((p[1] / p[2]).f64().abs())
-        });
-        if !(reach > 0.0 && reach.is_finite()) {
+        let unit = into_unit(&mut chains)?;
+        let given = cuts(&chains);
+        let size = profile_size(&given);
+        let whole = |cut: &[Vec<Cut>]| -> Result<Vec<Piece>, RegionError> {
+            let mut pieces = Vec::new();
+            for (i, cuts) in cut.iter().enumerate() {
+                assemble(i, cuts, size, unit, rules, &mut pieces)?;
+            }
+            tabulate(&mut pieces);
+            Ok(pieces)
+        };
+        let pieces = whole(&given)?;
+        let crosses = || lowest(&given) < -BELOW_AXIS * size;
+        let outline = if rules.across == Across::Mirror && crosses() {
+            let image: Vec<Chain> = chains.iter().map(Chain::mirrored).collect();
+            Outline::of_both(pieces, whole(&cuts(&image))?, rules.fill)?
+        } else {
+            Outline::of(pieces, rules.fill)?
+        };
+        if outline.boundary.iter().all(|p| p.piece.on_axis) {
             return Err(RegionError::NoArea);
         }
-        let unit = (reach.log2().floor() + 1.0).exp2();
-        for bezier in chains
-            .iter_mut()
-            .flat_map(|c| &mut c.pieces)
-            .map(|(b, _)| b)
-        {
-            for p in &mut bezier.points {
-                p[0] = p[0].scale_by_power_of_two(1.0 / unit);
-                p[1] = p[1].scale_by_power_of_two(1.0 / unit);
-            }
-            if let Some((centre, radius)) = &mut bezier.circle {
-                *centre = centre.map(|c| c.scale_by_power_of_two(1.0 / unit));
-                *radius = radius.scale_by_power_of_two(1.0 / unit);
-            }
-        }
-        let cut: Vec<Vec<Cut>> = chains
-            .iter()
-            .map(|c| {
-                c.pieces
-                    .iter()
-                    .map(|(b, curve)| Cut {
-                        bezier: b,
-                        curve: *curve,
-                        at: piece::cuts(b),
-                    })
-                    .collect()
-            })
-            .collect();
-        let size = profile_size(&cut);
-        let mut pieces = Vec::new();
-        for (i, cuts) in cut.iter().enumerate() {
-            let open = i == 0 && boundary == Boundary::ToAxis;
-            assemble(i, cuts, open, size, unit, &mut pieces)?;
-        }
-        tabulate(&mut pieces);
-        let outcome = boundary::filled_boundary(
-            &pieces,
-            &|w| fill.is_inside(w[0]),
-            &|_| 0,
-            1,
-            boundary::SAME_PROFILE,
-        );
-        if outcome.meetings > boundary::MOST_MEETINGS {
-            return Err(RegionError::Tangle {
-                limit: boundary::MOST_MEETINGS,
-            });
-        }
-        if outcome.pieces.iter().all(|p| p.piece.on_axis) {
-            return Err(RegionError::NoArea);
-        }
-        let mut warnings = Vec::new();
-        if let Some(at) = outcome.crossing {
-            warnings.push(format!(
+        let warning = outline.crossing.map(|at| {
+            format!(
                 "loops cross themselves or each other, first near (r, z) = ({}, {}); they are taken by the fill rule",
                 at[0] * unit,
                 at[1] * unit
-            ));
-        }
+            )
+        });
+        let size = match rules.across {
+            Across::Refuse => size,
+            _ => boundary_size(&outline.boundary),
+        };
         Ok(Self {
             unit,
             size,
-            section: Arc::new(Section::new(pieces, fill, &outcome.pieces)),
-            boundary: outcome.pieces,
-            warnings,
+            section: Arc::new(outline.section),
+            boundary: outline.boundary,
+            warnings: warning.into_iter().collect(),
         })
     }
 
@@ -237,15 +351,53 @@ fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain, RegionError> 
                 reason: "is beyond what f64 can evaluate; use coordinates nearer to 1".into(),
             });
         }
-        pieces.extend(made.into_iter().map(|b| (b, i)));
+        let breaks = curve::breaks(c);
+        pieces.extend(made.into_iter().map(|bezier| Link {
+            breaks: breaks.contains(&bezier.interval[1]),
+            bezier,
+            curve: i,
+        }));
     }
     Ok(Chain { pieces })
+}
+
+/// Scales everything by a power of two into the unit square; the unit in scene units.
+fn into_unit(chains: &mut [Chain]) -> Result<f64, RegionError> {
+    // The unit comes from control points: it only has to bring the numbers near 1.
+    let reach = chains
+        .iter()
+        .flat_map(|c| &c.pieces)
+        .flat_map(|p| &p.bezier.points);
+    let reach = reach.fold(0.0_f64, |m, p| {
+        m.max((p[0] / p[2]).f64().abs())
+            .max((p[1] / p[2]).f64().abs())
+    });
+    if !(reach > 0.0 && reach.is_finite()) {
+        return Err(RegionError::NoArea);
+    }
+    let unit = (reach.log2().floor() + 1.0).exp2();
+    for bezier in chains
+        .iter_mut()
+        .flat_map(|c| &mut c.pieces)
+        .map(|p| &mut p.bezier)
+    {
+        for p in &mut bezier.points {
+            p[0] = p[0].scale_by_power_of_two(1.0 / unit);
+            p[1] = p[1].scale_by_power_of_two(1.0 / unit);
+        }
+        if let Some((centre, radius)) = &mut bezier.circle {
+            *centre = centre.map(|c| c.scale_by_power_of_two(1.0 / unit));
+            *radius = radius.scale_by_power_of_two(1.0 / unit);
+        }
+    }
+    Ok(unit)
 }
 
 /// A Bézier piece with its cuts.
 struct Cut<'a> {
     bezier: &'a Bezier,
     curve: usize,
+    breaks: bool,
     at: Vec<(Dd, [Dd; 2])>,
 }
 
@@ -256,6 +408,39 @@ impl Cut<'_> {
     fn end(&self) -> [Dd; 2] {
         self.at[self.at.len() - 1].1
     }
+}
+
+impl<'a> Cut<'a> {
+    fn new(link: &'a Link) -> Self {
+        Self {
+            bezier: &link.bezier,
+            curve: link.curve,
+            breaks: link.breaks,
+            at: piece::cuts(&link.bezier),
+        }
+    }
+}
+
+fn cuts(chains: &[Chain]) -> Vec<Vec<Cut<'_>>> {
+    (chains.iter())
+        .map(|c| c.pieces.iter().map(Cut::new).collect())
+        .collect()
+}
+
+/// The least r of all.
+fn lowest(loops: &[Vec<Cut>]) -> f64 {
+    let points = loops.iter().flatten().flat_map(|c| &c.at);
+    points.fold(f64::INFINITY, |m, (_, p)| m.min(p[0].f64()))
+}
+
+/// The longer side of the box around a boundary.
+fn boundary_size(boundary: &[BoundaryPiece]) -> f64 {
+    let side = |c: usize| {
+        let low = boundary.iter().map(|b| b.piece.bounds.min[c]);
+        let high = boundary.iter().map(|b| b.piece.bounds.max[c]);
+        high.fold(f64::NEG_INFINITY, f64::max) - low.fold(f64::INFINITY, f64::min)
+    };
+    side(0).max(side(1))
 }
 
 fn profile_size(loops: &[Vec<Cut>]) -> f64 {
@@ -274,15 +459,19 @@ fn profile_size(loops: &[Vec<Cut>]) -> f64 {
 fn assemble(
     loop_index: usize,
     cuts: &[Cut],
-    open: bool,
     size: f64,
     unit: f64,
+    rules: &Rules,
     pieces: &mut Vec<Piece>,
 ) -> Result<(), RegionError> {
-    let allowed = GAP * size;
+    let open = loop_index == 0 && rules.boundary == Boundary::ToAxis;
+    let allowed = rules.gap * size;
     let first = pieces.len();
     for (i, cut) in cuts.iter().enumerate() {
-        add_pieces(loop_index, cut, size, unit, pieces)?;
+        if rules.across == Across::Refuse {
+            stays_off(loop_index, cut, size, unit)?;
+        }
+        add_pieces(loop_index, cut, pieces);
         let last = i + 1 == cuts.len();
         if last && open {
             break;
@@ -291,13 +480,26 @@ fn assemble(
         let (a, b) = (cut.end(), next.start());
         let gap = (a[0] - b[0]).f64().hypot((a[1] - b[1]).f64());
         if !(gap <= allowed) {
-            return Err(RegionError::Gap {
-                loop_index,
-                curve: cut.curve,
-                next: next.curve,
-                gap: gap * unit,
-                at: a.map(|c| c.f64() * unit),
-                allowed: allowed * unit,
+            let at = a.map(|c| c.f64() * unit);
+            let (gap, allowed) = (gap * unit, allowed * unit);
+            return Err(if cut.breaks && !last {
+                RegionError::Jump {
+                    loop_index,
+                    curve: cut.curve,
+                    parameter: cut.bezier.interval[1],
+                    gap,
+                    at,
+                    allowed,
+                }
+            } else {
+                RegionError::Gap {
+                    loop_index,
+                    curve: cut.curve,
+                    next: next.curve,
+                    gap,
+                    at,
+                    allowed,
+                }
             });
         }
         push_segment(above_axis(a), above_axis(b), loop_index, pieces);
@@ -312,7 +514,8 @@ fn assemble(
         push_segment(foot_b, foot_a, loop_index, pieces);
         push_segment(foot_a, a, loop_index, pieces);
     }
-    if pieces.len() == first {
+    // What lies beyond the axis may leave nothing of a loop.
+    if pieces.len() == first && rules.across == Across::Refuse {
         return Err(RegionError::NoArea);
     }
     Ok(())
@@ -329,28 +532,28 @@ fn above_axis(p: [Dd; 2]) -> [Dd; 2] {
     [if p[0] < Dd::ZERO { Dd::ZERO } else { p[0] }, p[1]]
 }
 
-fn add_pieces(
-    loop_index: usize,
-    cut: &Cut,
-    size: f64,
-    unit: f64,
-    pieces: &mut Vec<Piece>,
-) -> Result<(), RegionError> {
+/// Refuses a curve that crosses the axis.
+fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), RegionError> {
     let [u0, u1] = cut.bezier.interval;
-    if let Some((t, p)) = cut.at.iter().min_by(|a, b| {
+    let lowest = cut.at.iter().min_by(|a, b| {
         a.1[0]
             .partial_cmp(&b.1[0])
             .expect("coordinates are numbers")
-    }) && p[0].f64() < -BELOW_AXIS * size
-    {
-        return Err(RegionError::BelowAxis {
+    });
+    match lowest {
+        Some((t, p)) if p[0].f64() < -BELOW_AXIS * size => Err(RegionError::BelowAxis {
             loop_index,
             curve: cut.curve,
             r: p[0].f64() * unit,
             parameter: u0 + (u1 - u0) * t.f64(),
             allowed: -BELOW_AXIS * size * unit,
-        });
+        }),
+        _ => Ok(()),
     }
+}
+
+/// Adds the bi-monotone pieces of one piece; what is beyond the axis is laid on it, which changes no winding off it.
+fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Piece>) {
     let whole = Piece::new(
         cut.bezier.points.clone(),
         cut.start(),
@@ -367,7 +570,6 @@ fn add_pieces(
             continue;
         }
         if below {
-            // At most a rounding below the axis, or on it: taken as r = 0.
             push_segment([Dd::ZERO, start[1]], [Dd::ZERO, end[1]], loop_index, pieces);
         } else if whole.degree() == 1 {
             pieces.push(Piece::segment(start, end, loop_index));
@@ -375,7 +577,6 @@ fn add_pieces(
             pieces.push(whole.part(a, b, start, end));
         }
     }
-    Ok(())
 }
 
 /// Fills the pieces' tables of points at uniform parameters. All pieces of a degree share one

@@ -1,6 +1,6 @@
 //! From a scene's data to its solid and its grid.
 
-use super::error::SceneError;
+use super::faults::{Use, placed};
 use super::model::{
     self, AxisModel, CurveKind, CurveModel, GridStep, PlaceStep, ProfileModel, SceneModel,
     SolidKind, SolidModel, TurnModel,
@@ -10,7 +10,9 @@ use crate::error::Error;
 use crate::grid::{GridError, GridSpec};
 use crate::math::{Aabb, Similarity};
 use crate::nurbs::NurbsVolume;
-use crate::region::{Boundary, Fill, ProfileCurve, ProfileLoop, Region, RegionError};
+use crate::region::{
+    Across, Boundary, Ends, Fill, ProfileCurve, ProfileLoop, Region, RegionError, Rules,
+};
 use crate::solid::{
     Analytic, Assembly, Block, Body, Ellipsoid, Measures, Operation, Part, Shape, Turn,
 };
@@ -91,7 +93,8 @@ impl Scene {
                     let region = match regions.entry(*profile) {
                         Entry::Occupied(known) => known.get().clone(),
                         Entry::Vacant(place) => {
-                            let region = region(data).map_err(|e| placed(&model, data, &e))?;
+                            let region = region(data, &rules(data))
+                                .map_err(|e| placed(&model, data, &e, Use::Turned))?;
                             let said = region.warnings().iter();
                             warnings.extend(said.map(|w| format!("profiles.{name}: {w}")));
                             place.insert(Arc::new(region)).clone()
@@ -103,7 +106,8 @@ impl Scene {
                     turned(&model, solid, round(&model, solid, *shape)?, *turn)?
                 }
                 SolidKind::Ellipsoid { radii } => {
-                    let frame = frame(&model, &solid.axis, &solid.steps, &solid.path)?;
+                    // It is its own mirror image.
+                    let frame = placing(&model, solid)?.frame;
                     let made = Ellipsoid::new(&frame, DVec3::from(*radii));
                     let body = made.ok_or_else(|| unmade(&model, solid))?;
                     Part::new(solid.name.clone(), solid.material, Body::Ellipsoid(body))
@@ -131,7 +135,7 @@ impl Scene {
                     part
                 }
                 SolidKind::Box { size } => {
-                    let frame = frame(&model, &solid.axis, &solid.steps, &solid.path)?;
+                    let frame = placing(&model, solid)?.frame;
                     let body = Body::Block(Block::new(&frame, DVec3::from(*size)));
                     Part::new(solid.name.clone(), solid.material, body)
                 }
@@ -144,7 +148,7 @@ impl Scene {
             }));
         }
         let reference = model.reference.as_ref().map(|r| {
-            let frame = frame(&model, &r.axis, &r.steps, "reference")?;
+            let frame = frame(&model, &r.axis, &r.steps, "reference")?.frame;
             Ok::<_, Error>(Analytic::new(r.shape, frame))
         });
         Ok(Self {
@@ -195,6 +199,23 @@ impl Scene {
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// What a user should know of a grid: that it holds none, or not all, of the solid.
+    ///
+    /// ```
+    /// let scene = voxlathe::Scene::parse("
+    ///     schema = 1
+    ///     grid = { bounds = [[0, 0, 0], [2, 1, 1]], resolution = 8 }
+    ///     solid = [{ kind = 'sphere', radius = 1 }]
+    /// ")?;
+    /// let warning = scene.grid_warning(&scene.grid()?).expect("seven eighths are outside");
+    /// assert!(warning.starts_with("the grid does not hold all of the solid"));
+    /// # Ok::<(), voxlathe::Error>(())
+    /// ```
+    #[must_use]
+    pub fn grid_warning(&self, grid: &GridSpec) -> Option<String> {
+        super::window::warning(self.assembly.parts(), grid)
     }
 
     /// The volume of the composite in cubed scene units, computed once; `None` where that is too
@@ -372,7 +393,7 @@ impl Scene {
 }
 
 /// The loops of a profile: the chain first, where there is one.
-fn loops(profile: &ProfileModel) -> Vec<&[CurveModel]> {
+pub(super) fn loops(profile: &ProfileModel) -> Vec<&[CurveModel]> {
     profile
         .curves
         .iter()
@@ -381,20 +402,33 @@ fn loops(profile: &ProfileModel) -> Vec<&[CurveModel]> {
         .collect()
 }
 
-pub(super) fn region(profile: &ProfileModel) -> Result<Region, RegionError> {
+/// The region that a profile's curves make by those rules.
+pub(super) fn region(profile: &ProfileModel, rules: &Rules) -> Result<Region, RegionError> {
     let loops: Vec<ProfileLoop> = loops(profile)
         .into_iter()
         .map(|l| l.iter().map(curve).collect())
         .collect();
-    let boundary = match profile.boundary {
-        model::Boundary::Closed => Boundary::Closed,
-        model::Boundary::ToAxis => Boundary::ToAxis,
-    };
-    let fill = match profile.fill {
-        model::Fill::EvenOdd => Fill::EvenOdd,
-        model::Fill::NonZero => Fill::NonZero,
-    };
-    Region::new(&loops, boundary, fill)
+    Region::with_rules(&loops, rules)
+}
+
+/// How the curves of a profile become its region.
+pub(super) fn rules(profile: &ProfileModel) -> Rules {
+    Rules {
+        boundary: match profile.boundary {
+            model::Boundary::Closed => Boundary::Closed,
+            model::Boundary::ToAxis => Boundary::ToAxis,
+        },
+        fill: match profile.fill {
+            model::Fill::EvenOdd => Fill::EvenOdd,
+            model::Fill::NonZero => Fill::NonZero,
+        },
+        gap: profile.gap,
+        across: match profile.across {
+            model::Across::Refuse => Across::Refuse,
+            model::Across::Clip => Across::Clip,
+            model::Across::Mirror => Across::Mirror,
+        },
+    }
 }
 
 pub(super) fn curve(curve: &CurveModel) -> ProfileCurve {
@@ -454,9 +488,19 @@ pub(super) fn curve(curve: &CurveModel) -> ProfileCurve {
             from: 0.0,
             to: 360.0,
         },
-        CurveKind::Interpolate { points, degree } => ProfileCurve::Interpolate {
+        CurveKind::Interpolate {
+            points,
+            degree,
+            closed,
+            tangents,
+        } => ProfileCurve::Interpolate {
             points: flat(points),
             degree: *degree,
+            ends: if *closed {
+                Ends::Closed
+            } else {
+                Ends::Open(*tangents)
+            },
         },
     };
     if curve.reverse {
@@ -466,89 +510,19 @@ pub(super) fn curve(curve: &CurveModel) -> ProfileCurve {
     }
 }
 
-/// A region's error at its place in the scene.
-pub(super) fn placed(
-    model: &SceneModel,
-    profile: &ProfileModel,
-    error: &RegionError,
-) -> SceneError {
-    let loops = loops(profile);
-    let curve_at = |l: usize, c: usize| loops.get(l).and_then(|curves| curves.get(c));
-    let name = |l: usize, c: usize| curve_at(l, c).map_or_else(String::new, |c| c.path.clone());
-    let (place, path) = match error.place() {
-        Some((l, Some(c))) => curve_at(l, c).map_or((profile.place, profile.path.clone()), |c| {
-            (c.place, c.path.clone())
-        }),
-        _ => (profile.place, profile.path.clone()),
-    };
-    let (found, wanted, hint) = match error {
-        RegionError::Gap {
-            loop_index,
-            curve,
-            next,
-            gap,
-            at,
-            allowed,
-        } => (
-            format!(
-                "a gap of {gap:e} between the end of {} at (r, z) = ({}, {}) and the start of {}",
-                name(*loop_index, *curve),
-                at[0],
-                at[1],
-                name(*loop_index, *next)
-            ),
-            format!("curves that meet within {allowed:e}"),
-            Some(
-                if curve_at(*loop_index, *curve).is_some_and(|_| *next == 0) {
-                    "add a closing curve, or use boundary = \"to-axis\" for an open chain"
-                        .to_owned()
-                } else {
-                    "move an end, or add a segment between them".to_owned()
-                },
-            ),
-        ),
-        RegionError::BelowAxis {
-            r,
-            parameter,
-            allowed,
-            ..
-        } => (
-            format!("r = {r:e} at parameter {parameter}"),
-            format!("a curve with r >= {allowed:e}"),
-            Some("move its control points to r >= 0".to_owned()),
-        ),
-        RegionError::Curve { reason, .. } => (
-            format!("a curve that {reason}"),
-            "a curve that can be drawn".to_owned(),
-            None,
-        ),
-        RegionError::Tangle { limit } => (
-            error.to_string(),
-            format!("loops that meet at most {limit} times"),
-            None,
-        ),
-        _ => (
-            error.to_string(),
-            "curves that enclose an area".to_owned(),
-            None,
-        ),
-    };
-    model.error(place, &path, Some(found), &wanted, hint)
-}
-
 fn turned(
     model: &SceneModel,
     solid: &SolidModel,
     region: Arc<Region>,
     turn: TurnModel,
 ) -> Result<Part, Error> {
-    let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
+    let placing = placing(model, solid)?;
     Ok(Part::revolved(
         solid.name.clone(),
         solid.material,
         region,
-        &frame,
-        Turn::new(turn.start, turn.angle),
+        &placing.frame,
+        placing.turn(turn),
     ))
 }
 
@@ -583,13 +557,34 @@ fn check_size(model: &SceneModel, solid: &SolidModel, part: &Part) -> Result<(),
     Err(error.into())
 }
 
+/// Where something about an axis is.
+pub(super) struct Placing {
+    /// Its frame, always right-handed.
+    pub(super) frame: Similarity,
+    /// Whether its y is to be reflected before it is placed: an odd number of mirrors is a rotation of that image.
+    pub(super) mirrored: bool,
+}
+
+impl Placing {
+    /// A turn as it is in the frame.
+    pub(super) fn turn(&self, turn: TurnModel) -> Turn {
+        let turn = Turn::new(turn.start, turn.angle);
+        if self.mirrored { turn.mirrored() } else { turn }
+    }
+}
+
+/// Where a solid is.
+pub(super) fn placing(model: &SceneModel, solid: &SolidModel) -> Result<Placing, Error> {
+    frame(model, &solid.axis, &solid.steps, &solid.path)
+}
+
 /// The frame of something about an axis, placed.
-pub(super) fn frame(
+fn frame(
     model: &SceneModel,
     axis: &AxisModel,
     steps: &[PlaceStep],
     path: &str,
-) -> Result<Similarity, Error> {
+) -> Result<Placing, Error> {
     let direction = DVec3::from(axis.direction);
     let x = axis.x.map_or_else(|| default_x(direction), DVec3::from);
     let refused = |what: &str, wanted: &str| {
@@ -603,6 +598,7 @@ pub(super) fn frame(
                 "a direction that is not zero and an x that is not parallel to it",
             )
         })?;
+    let mut mirrored = false;
     for step in steps {
         frame = match *step {
             PlaceStep::Scale(s) => frame.scaled(s),
@@ -610,9 +606,15 @@ pub(super) fn frame(
                 .rotated(DVec3::from(axis), degrees)
                 .ok_or_else(|| refused("a rotation about nothing", "an axis that is not zero"))?,
             PlaceStep::Translate(by) => frame.translated(DVec3::from(by)),
+            PlaceStep::Mirror(normal) => {
+                mirrored = !mirrored;
+                frame
+                    .reflected(DVec3::from(normal))
+                    .ok_or_else(|| refused("a mirror without a normal", "one that is not zero"))?
+            }
         };
     }
-    Ok(frame)
+    Ok(Placing { frame, mirrored })
 }
 
 /// +x, or +y where the axis is within a degree of ±x.

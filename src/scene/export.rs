@@ -5,7 +5,8 @@
 //!   cylinder, cone, sphere  segment or half circle x disc, of a partial turn x arc after ruling to the axis
 //!   torus                   disc x circle, where the tube does not cross the axis
 //!   revolve                 as a volume of construct = "curve-disc", where its profile is one chain to the
-//!                           axis along which z never turns back
+//!                           axis along which z never turns back; else as sections of construct =
+//!                           "surface-circle" (see [`super::sections`])
 //!   ellipsoid               the ball of radius 1, stretched
 //!   box                     one patch of degrees 1, 1, 1
 //! ```
@@ -13,12 +14,11 @@
 //! * Units: scene units; angles in degrees.
 //! * Accuracy: control points are those of [`crate::construct`], placed in double-double and rounded once;
 //!   those of an ellipsoid have one rounding more. Weights and knots are not changed.
-//! * Not every solid of revolution has such a form here: where a profile runs back along the axis, curve
-//!   times disc folds (see [`crate::construct`]).
+//! * Not every solid of revolution has such a form here: what neither chain nor sections can hold is refused.
 
-use super::build::frame;
-use super::model::{SceneModel, SolidKind, SolidModel, TurnModel};
-use super::nets;
+use super::build::{placing, region, rules};
+use super::model::{Boundary, SceneModel, SolidKind, SolidModel, TurnModel};
+use super::{nets, sections};
 use crate::construct::{
     AngleInterval, AxisFrame, ConstructError, Construction, DiscForm, solid_of_revolution,
     sphere_profile, sphere_volume, torus_volume,
@@ -46,9 +46,11 @@ pub(super) fn volumes(
         (SolidKind::Volume(_), _) => {
             return Err(refused("the union of discs that overlap".to_owned()));
         }
-        (SolidKind::Revolve { profile, turn }, _) => nets::revolved(model, solid, *profile, *turn)?,
+        (SolidKind::Revolve { profile, turn }, _) => {
+            revolved(model, solid, *profile, closed(*turn), &refused)?
+        }
         (SolidKind::Round { shape, turn }, _) => {
-            vec![round(*shape, *turn).map_err(|e| refused(e.to_string()))?]
+            vec![round(*shape, closed(*turn)).map_err(|e| refused(e.to_string()))?]
         }
         (SolidKind::Ellipsoid { radii }, _) => {
             let made = ellipsoid(*radii).map_err(|e| refused(e.to_string()));
@@ -56,11 +58,61 @@ pub(super) fn volumes(
         }
         (SolidKind::Box { size }, _) => vec![block(*size).map_err(|e| refused(e.to_string()))?],
     };
-    let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
-    let placed = local.iter().map(|volume| placed(&frame, volume));
-    placed
+    let placing = placing(model, solid)?;
+    // The nets of a body are those of its frame; the others are not yet reflected.
+    let reflect = placing.mirrored && !matches!(body, Body::Patches(_));
+    let clockwise = match &solid.kind {
+        SolidKind::Revolve { turn, .. } | SolidKind::Round { turn, .. } => {
+            closed(*turn).angle < 0.0
+        }
+        _ => false,
+    };
+    // Programs that read the nets want the Jacobian determinant positive, as it was before.
+    let reverse = placing.mirrored != clockwise;
+    let place = |volume: &NurbsVolume| -> Result<NurbsVolume, NurbsError> {
+        let mut volume = volume.clone();
+        if reflect {
+            volume = nets::mirrored(&volume)?;
+        }
+        if reverse {
+            volume = volume.reverse(2)?;
+        }
+        placed(&placing.frame, &volume)
+    };
+    (local.iter().map(place))
         .collect::<Result<_, _>>()
         .map_err(|e| refused(e.to_string()))
+}
+
+/// The same turn; a full one counter-clockwise, since it is the same solid either way.
+fn closed(turn: TurnModel) -> TurnModel {
+    match turn.angle {
+        -360.0 => TurnModel {
+            angle: 360.0,
+            ..turn
+        },
+        _ => turn,
+    }
+}
+
+/// The volumes of a turned profile: of its chain, or of its region where that can be filled.
+fn revolved(
+    model: &SceneModel,
+    solid: &SolidModel,
+    profile: usize,
+    turn: TurnModel,
+    refused: &dyn Fn(String) -> Error,
+) -> Result<Vec<NurbsVolume>, Error> {
+    let data = &model.profiles[profile].1;
+    let filled = || -> Result<Vec<NurbsVolume>, String> {
+        let region = region(data, &rules(data)).map_err(|e| e.to_string())?;
+        let turn = AngleInterval::new(turn.start, turn.angle).map_err(|e| e.to_string())?;
+        sections::volumes(data, &region, turn)
+    };
+    if data.boundary == Boundary::Closed {
+        return filled().map_err(refused);
+    }
+    nets::revolved(model, solid, profile, turn).or_else(|error| filled().map_err(|_| error))
 }
 
 fn round(shape: Shape, turn: TurnModel) -> Result<NurbsVolume, ConstructError> {

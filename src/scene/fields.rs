@@ -1,7 +1,7 @@
 //! Tables whose keys are checked, and the types of single values.
 
 use super::error::{At, Fault, Place, shorten};
-use super::keys::{nearest, one_of};
+use super::keys::{self, nearest, one_of};
 use super::limits::{MAX_MAGNITUDE, MAX_NAME, MIN_MAGNITUDE};
 use super::value::{Entry, Kind, Value};
 
@@ -30,8 +30,12 @@ impl<'a> Fields<'a> {
         for entry in entries {
             if !keys.contains(&entry.key.as_str()) {
                 let key = &entry.key;
-                let hint = nearest(key, keys.iter().copied())
-                    .map(|near| format!("did you mean `{near}`?"));
+                // A key that is there already cannot be what was meant.
+                let free = |near: &&str| find(entries, near).is_none();
+                let candidates = || keys.iter().copied().filter(free);
+                let hint = keys::meant(key, candidates()).or_else(|| {
+                    nearest(key, candidates()).map(|near| format!("did you mean `{near}`?"))
+                });
                 return Err(Fault::found(
                     entry.key_place,
                     format!("unknown key `{}`", shorten(key)),

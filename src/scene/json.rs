@@ -1,7 +1,7 @@
 //! Strict JSON with the place of every value.
 //!
-//! RFC 8259 and nothing more: no comments, trailing or missing commas, single quotes, bare words or
-//! byte order mark. Keys are unique, nesting is at most [`MAX_DEPTH`] deep, so the recursion is.
+//! RFC 8259 and nothing more: no comments, trailing or missing commas, single quotes or bare words. A byte order
+//! mark before the text is passed over, as that document allows. Keys are unique, nesting is at most [`MAX_DEPTH`] deep, so the recursion is.
 //! A number beyond the range of f64 becomes infinite here and is refused by the key that reads it.
 
 use std::collections::BTreeMap;
@@ -10,11 +10,18 @@ use super::error::{Fault, Place, shorten};
 use super::limits::MAX_DEPTH;
 use super::value::{Entry, Kind, Value};
 
+/// The byte order mark.
+const MARK: char = '\u{feff}';
+
 /// Reads a JSON document. `source` is the index of `text` among the sources.
 pub(super) fn from_json(text: &str, source: u32) -> Result<Value, Fault> {
     let mut reader = Reader {
         text,
-        at: 0,
+        at: if text.starts_with(MARK) {
+            MARK.len_utf8()
+        } else {
+            0
+        },
         source,
     };
     reader.skip_blanks();
@@ -58,7 +65,7 @@ impl Reader<'_> {
         let place = Place::new(self.source, self.at..self.at + length);
         let found = match rest.chars().next() {
             None => "the end of the text".to_owned(),
-            Some('\u{feff}') => "a byte order mark".to_owned(),
+            Some(MARK) => "a byte order mark".to_owned(),
             Some(_) => format!("`{}`", shorten(&rest[..length])),
         };
         let hint = match rest.as_bytes() {
@@ -365,8 +372,8 @@ mod tests {
             ),
             ("[1.]", "x.json:1:4: [0]: found `]`, wanted a digit"),
             (
-                "\u{feff}{}",
-                "x.json:1:1: found a byte order mark, wanted a json value",
+                "\u{feff}\u{feff}{}",
+                "x.json:1:2: found a byte order mark, wanted a json value",
             ),
         ] {
             assert_eq!(read(text).expect_err(text), wanted, "{text}");
@@ -395,6 +402,7 @@ mod tests {
         assert!(read(r#""\ud83c""#).is_err());
         assert!(read(r#""\ud83c\u0041""#).is_err());
         assert!(read(r#""\u00é9""#).is_err());
+        assert!(read("\u{feff}{}").is_ok());
         assert!(read("\"a\nb\"").is_err());
     }
 

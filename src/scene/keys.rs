@@ -24,7 +24,7 @@ pub(super) const GRID: &[&str] = &[
 /// `[output]`.
 pub(super) const OUTPUT: &[&str] = &["channels", "formats", "compression", "band"];
 /// `[profiles.NAME]`.
-pub(super) const PROFILE: &[&str] = &["boundary", "fill", "curves", "loops"];
+pub(super) const PROFILE: &[&str] = &["boundary", "fill", "gap", "across", "curves", "loops"];
 /// A curve of kind `nurbs`.
 pub(super) const NURBS: &[&str] = &["kind", "reverse", "degree", "points", "weights", "knots"];
 /// A curve of kind `bezier`.
@@ -38,7 +38,15 @@ pub(super) const CIRCLE: &[&str] = &["kind", "reverse", "center", "radius"];
 /// A curve of kind `ellipse`.
 pub(super) const ELLIPSE: &[&str] = &["kind", "reverse", "center", "radii", "tilt"];
 /// A curve of kind `interpolate`.
-pub(super) const INTERPOLATE: &[&str] = &["kind", "reverse", "points", "degree"];
+pub(super) const INTERPOLATE: &[&str] = &[
+    "kind",
+    "reverse",
+    "points",
+    "degree",
+    "closed",
+    "start-tangent",
+    "end-tangent",
+];
 /// `points` from a file.
 pub(super) const POINTS_FILE: &[&str] = &["file"];
 /// `[[solid]]` of kind `revolve`.
@@ -149,7 +157,7 @@ pub(super) const SECTION: &[&str] = &["degrees", "knots", "points", "weights"];
 /// `solid.axis`.
 pub(super) const AXIS: &[&str] = &["origin", "direction", "x"];
 /// One step of `solid.place`.
-pub(super) const STEP: &[&str] = &["scale", "rotate", "translate"];
+pub(super) const STEP: &[&str] = &["scale", "rotate", "translate", "mirror"];
 /// `rotate` of a step.
 pub(super) const ROTATE: &[&str] = &["axis", "degrees"];
 /// Kinds of curves with the keys of each.
@@ -184,6 +192,45 @@ pub(super) const REFERENCES: &[(&str, &[&str])] = &[
     ),
     ("sphere", &["kind", "radius", "axis", "place"]),
 ];
+
+/// Words of other programs: the key that says the same here, and how.
+const MEANT: &[(&str, &str, &str)] = &[
+    (
+        "end",
+        "angle",
+        "`angle` is how far it turns from `start`, in degrees",
+    ),
+    (
+        "periodic",
+        "closed",
+        "`closed = true` makes a closed smooth curve",
+    ),
+    ("ccw", "angle", "a negative `angle` turns clockwise"),
+    ("clockwise", "angle", "a negative `angle` turns clockwise"),
+    (
+        "tolerance",
+        "gap",
+        "`gap` is the share of the size up to which ends are joined",
+    ),
+    (
+        "reflect",
+        "mirror",
+        "`mirror` takes the normal of the plane",
+    ),
+];
+
+/// What to say of a word that another program has for one of the candidates.
+pub(super) fn meant<'a>(
+    word: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
+    let word = word.to_lowercase();
+    let (_, key, hint) = MEANT.iter().find(|(other, _, _)| *other == word)?;
+    candidates
+        .into_iter()
+        .any(|candidate| candidate == *key)
+        .then(|| (*hint).to_owned())
+}
 
 /// The candidate nearest to `word`, when one is near enough to be what was meant.
 pub(crate) fn nearest<'a>(

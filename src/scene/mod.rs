@@ -23,6 +23,7 @@ use std::sync::Arc;
 mod build;
 mod error;
 mod export;
+mod faults;
 mod fields;
 mod fold;
 mod json;
@@ -36,6 +37,7 @@ mod read;
 mod reference;
 mod resolve;
 mod schema;
+mod sections;
 mod set;
 mod shapes;
 mod solid;
@@ -44,6 +46,7 @@ mod tests;
 mod toml_reader;
 mod value;
 mod volume;
+mod window;
 
 pub use build::Scene;
 pub use error::{InputProblem, Place, SceneError, Sources};
@@ -54,8 +57,8 @@ pub use limits::{
     MAX_SOLIDS, MAX_TABLES, MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
-    AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName, CurveForm,
-    CurveKind, CurveModel, FieldModel, Fill, FormatName, GridModel, GridStep, Operation,
+    Across, AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName,
+    CurveForm, CurveKind, CurveModel, FieldModel, Fill, FormatName, GridModel, GridStep, Operation,
     OutputModel, PARAMETERS, PatchModel, PlaceStep, PointModel, ProfileModel, SceneModel,
     SectionModel, SolidKind, SolidModel, TurnModel, Units, VolumeModel, VolumeSource,
 };
@@ -153,7 +156,7 @@ const STDIN: &str = "<stdin>";
 /// assert_eq!(
 ///     error.expect_err("more than a turn").to_string(),
 ///     "--set solid.0.angle=400: solid[0].angle: found 400, \
-///      wanted an angle greater than 0 and at most 360",
+///      wanted an angle other than 0, of at most 360 either way",
 /// );
 /// # Ok::<(), voxlathe::scene::SceneError>(())
 /// ```

@@ -152,6 +152,18 @@ named! {
 }
 
 named! {
+    /// What becomes of a profile that reaches over the axis.
+    Across {
+        /// It is refused.
+        Refuse = "refuse",
+        /// What lies at r >= 0 is taken.
+        Clip = "clip",
+        /// The union with its mirror image in the axis is taken.
+        Mirror = "mirror",
+    }
+}
+
+named! {
     /// What a solid does to what the solids before it have made.
     Operation {
         /// Union.
@@ -320,6 +332,10 @@ pub struct ProfileModel {
     pub boundary: Boundary,
     /// How several loops combine.
     pub fill: Fill,
+    /// Share of the profile's size up to which gaps are closed, from 0 to 1e-3.
+    pub gap: f64,
+    /// What becomes of curves that reach over the axis.
+    pub across: Across,
     /// The loop (closed) or the open chain (to-axis), never empty; `None` where `loops` holds
     /// everything.
     pub curves: Option<Vec<CurveModel>>,
@@ -369,7 +385,7 @@ pub enum CurveKind {
         points: Vec<PointModel>,
         /// One for each point, finite and positive.
         weights: Vec<f64>,
-        /// Points + degree + 1 knots, not decreasing, interior multiplicity at most the degree.
+        /// Points + degree + 1 knots, not decreasing, none more than degree + 1 times.
         knots: Vec<f64>,
     },
     /// A rational Bézier curve, its degree one less than the points.
@@ -411,12 +427,17 @@ pub enum CurveKind {
         /// Turn about the centre in degrees, counter-clockwise.
         tilt: f64,
     },
-    /// The clamped spline through the points.
+    /// The spline through the points.
     Interpolate {
-        /// Points, at least 2.
+        /// Points, at least 2, of a closed one 3.
         points: Vec<PointModel>,
-        /// Degree, already reduced to one less than the points where there are few.
+        /// Degree; of an open one already reduced to one less than the points and tangents where there are few, of a
+        /// closed one odd.
         degree: usize,
+        /// Whether it goes back to its first point, smoothly.
+        closed: bool,
+        /// Derivatives by chord length at the ends of an open one.
+        tangents: [Option<[f64; 2]>; 2],
     },
 }
 
@@ -567,7 +588,7 @@ pub struct SectionModel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TurnModel {
-    /// Angle turned in degrees, above 0 and at most 360.
+    /// Angle turned in degrees, not 0 and at most 360 either way; negative: clockwise.
     pub angle: f64,
     /// Angle at which the turn starts, in degrees.
     pub start: f64,
@@ -617,4 +638,6 @@ pub enum PlaceStep {
     },
     /// Moving.
     Translate([f64; 3]),
+    /// Reflection in the plane through the origin with that normal, not zero, of any length.
+    Mirror([f64; 3]),
 }

@@ -1,7 +1,9 @@
 //! From the data of a volume to its NURBS.
 
-use super::build::{curve, frame, placed, region};
-use super::error::Place;
+use super::build::{Placing, curve, placing};
+use super::build::{region, rules};
+use super::error::{Place, SceneError};
+use super::faults::{Use, placed};
 use super::fold::{self, Fold};
 use super::limits::{MAX_CELLS, MAX_COEFFICIENTS, MAX_WEIGHT_RATIO};
 use super::model::{
@@ -13,17 +15,18 @@ use crate::construct::{
     meridian, surface_circle,
 };
 use crate::error::Error;
-use crate::math::Similarity;
 use crate::math::bernstein;
+use crate::math::tolerance::GAP;
 use crate::math::{Dd, Real};
 use crate::nurbs::{
     CellIndex, JacobianSign, KnotVector, NurbsCurve, NurbsError, NurbsSurface, NurbsVolume,
     OrientationError,
 };
 use crate::region::{
-    Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, RegionError, beziers,
+    Across, Boundary, Fill, HomogeneousPoint, ProfileCurve, ProfileLoop, Region, RegionError,
+    Rules, beziers,
 };
-use crate::solid::{Body, Field, Part, Patches, Turn};
+use crate::solid::{Body, Field, Part, Patches};
 use std::sync::Arc;
 
 /// The part that a volume is; what a user should know of it goes to `warnings`.
@@ -33,9 +36,9 @@ pub(super) fn part(
     volume: &VolumeModel,
     warnings: &mut Vec<String>,
 ) -> Result<Part, Error> {
-    let frame = frame(model, &solid.axis, &solid.steps, &solid.path)?;
+    let placing = placing(model, solid)?;
     let maker = Maker { model, solid };
-    let source = &volume.source;
+    let (source, notes) = (&volume.source, volume.notes.as_slice());
     let volumes = match source {
         VolumeSource::Patches(patches) => maker.patches(patches)?,
         VolumeSource::Section { section, turn } => vec![maker.section(section, *turn)?],
@@ -51,10 +54,16 @@ pub(super) fn part(
                     let hint = "fill = \"union\" takes the union of its discs; kind = \"revolve\" what it encloses";
                     return Err(maker.runs_back(back, hint));
                 }
-                return maker.stack(&frame, &chain, *turn);
+                return maker.stack(&placing, &chain, *turn);
             }
             maker.curve(*form, chain, *turn)?
         }
+    };
+    let volumes = if placing.mirrored {
+        let images = volumes.iter().map(mirrored).collect::<Result<_, _>>();
+        images.map_err(|e| maker.refused(&e.to_string()))?
+    } else {
+        volumes
     };
     maker.check_size(&volumes)?;
     for (index, volume) in volumes.iter().enumerate() {
@@ -68,15 +77,14 @@ pub(super) fn part(
             VolumeSource::Patches(patches) => fold::rounding(patches[index].points.iter()),
             VolumeSource::Curve { .. } => fold::rounding(volume.control_points().iter()),
         };
-        if let Some(said) = maker.check(&key, volume, place, rounding)? {
-            warnings.push(said);
-        }
+        let said = maker.check(&key, volume, place, rounding);
+        warnings.extend(said.map_err(|e| noted(e, notes))?);
     }
     let fields = match source {
         VolumeSource::Patches(patches) => fields(patches, &volumes),
         _ => Ok(Vec::new()),
     };
-    let body = fields.and_then(|fields| Patches::new(&frame, volumes, fields));
+    let body = fields.and_then(|fields| Patches::new(&placing.frame, volumes, fields));
     let body = body.map_err(|e| maker.refused(&e.to_string()))?;
     if body.faces().faces().is_empty() {
         let key = match source {
@@ -92,6 +100,19 @@ pub(super) fn part(
         solid.material,
         Body::Patches(body),
     ))
+}
+
+/// An error about nets, with what was assumed when they were read: that may be why.
+fn noted(error: Error, notes: &[String]) -> Error {
+    match error {
+        Error::Scene(SceneError::Input { mut problem }) if !notes.is_empty() => {
+            let hints = problem.hint.take().into_iter();
+            let hints: Vec<String> = notes.iter().cloned().chain(hints).collect();
+            problem.hint = Some(hints.join("; "));
+            Error::Scene(SceneError::Input { problem })
+        }
+        other => other,
+    }
 }
 
 /// The volumes that a turned profile is, where it is one chain to the axis along which z never turns
@@ -161,6 +182,12 @@ impl Piece {
     fn curve(&self) -> Result<NurbsCurve<2>, NurbsError> {
         joined(std::slice::from_ref(self))
     }
+}
+
+/// Whether a piece begins with the point and weight with which the last one ends.
+fn continues(run: &[Piece], next: &Piece) -> bool {
+    let end = run.last().and_then(|piece| piece.points.last());
+    end.is_some_and(|end| (end[2] / next.points[0][2] - Dd::ONE).abs().f64() < 1e-12)
 }
 
 /// Consecutive pieces of one degree as one curve over [0, their number].
@@ -353,12 +380,16 @@ impl Maker<'_> {
             return Err(self.fault(".profile", found.to_owned(), wanted, None));
         }
         // What is refused when it is turned as a profile is refused here.
-        match region(profile) {
+        let upright = Rules {
+            across: Across::Refuse,
+            ..rules(profile)
+        };
+        match region(profile, &upright) {
             Ok(_) => {}
             Err(RegionError::NoArea) if union => {}
             Err(RegionError::NoArea) => return Err(self.encloses_nothing()),
             Err(RegionError::Tangle { .. }) => {}
-            Err(error) => return Err(placed(self.model, profile, &error).into()),
+            Err(error) => return Err(placed(self.model, profile, &error, Use::Volume).into()),
         }
         let mut pieces = Vec::new();
         for (index, one) in profile.curves.iter().flatten().enumerate() {
@@ -422,7 +453,8 @@ impl Maker<'_> {
                 Some(run)
                     if !broken
                         && run[0].curve == piece.curve
-                        && run[0].points.len() == piece.points.len() =>
+                        && run[0].points.len() == piece.points.len()
+                        && continues(run, &piece) =>
                 {
                     run.push(piece);
                 }
@@ -440,13 +472,15 @@ impl Maker<'_> {
         let splits = splits(&radii);
         let made = || -> Result<Vec<NurbsVolume>, ConstructError> {
             let angle = AngleInterval::new(turn.start, turn.angle)?;
+            // The disc of a full turn has no direction.
+            let full = AngleInterval::new(turn.start, 360.0)?;
             let stepped = splits.iter().any(|s| !s.is_empty());
             let regular = form == CurveForm::Disc && angle.is_full() && !stepped;
             let volumes = runs.iter().zip(&splits).map(|(run, splits)| {
                 let curve = meridian(&joined(run)?)?;
                 let world = &AxisFrame::WORLD;
                 if regular {
-                    return curve_disc(&curve, DiscForm::Biquadratic, angle, world);
+                    return curve_disc(&curve, DiscForm::Biquadratic, full, world);
                 }
                 // The polar disc makes of a what c is.
                 let whole = curve_to_axis(&curve, CircleForm::Quadratic, angle, world)?;
@@ -466,7 +500,7 @@ impl Maker<'_> {
 
     /// The union of the discs of a chain that runs back: every piece with the axis is a loop of one
     /// direction.
-    fn stack(&self, frame: &Similarity, chain: &Chain, turn: TurnModel) -> Result<Part, Error> {
+    fn stack(&self, placing: &Placing, chain: &Chain, turn: TurnModel) -> Result<Part, Error> {
         let made = || -> Result<Region, String> {
             let mut loops: Vec<ProfileLoop> = Vec::new();
             for piece in chain.pieces.iter().filter(|p| p.rise() != 0.0) {
@@ -497,8 +531,8 @@ impl Maker<'_> {
             self.solid.name.clone(),
             self.solid.material,
             Arc::new(region),
-            frame,
-            Turn::new(turn.start, turn.angle),
+            &placing.frame,
+            placing.turn(turn),
         ))
     }
 }
@@ -529,17 +563,28 @@ fn widest_weights(volume: &NurbsVolume) -> Option<(CellIndex, [f64; 2])> {
     each.max_by(|a, b| ratio(a.1).total_cmp(&ratio(b.1)))
 }
 
+/// The image under y -> -y, with the same parameters.
+pub(super) fn mirrored(volume: &NurbsVolume) -> Result<NurbsVolume, NurbsError> {
+    let points = volume.control_points().iter();
+    // Not -y, which makes -0 of 0.
+    let image = points.map(|&[x, y, z]| [x, 0.0 - y, z]);
+    NurbsVolume::new(
+        volume.knots().clone(),
+        image.collect(),
+        volume.weights().to_vec(),
+    )
+}
+
 /// The NURBS of a patch.
 fn volume_of(patch: &PatchModel) -> Result<NurbsVolume, NurbsError> {
     let [u, v, w] = [0, 1, 2].map(|k| KnotVector::new(patch.degrees[k], patch.knots[k].clone()));
     NurbsVolume::new([u?, v?, w?], patch.points.clone(), patch.weights.clone())
 }
 
-/// Pieces that meet end to end: a gap, which is at most 1e-9 of the profile's size, is closed by a
-/// segment.
+/// Pieces that meet end to end: a gap is closed by a segment.
 ///
-/// A segment too low to have faces of its own, or one that runs back, is left out: there the next piece
-/// begins at the height at which the last one ends.
+/// A segment too low to have faces of its own, or one that runs back by no more than rounding, is left out: there the next
+/// piece begins at the height at which the last one ends.
 fn without_gaps(pieces: Vec<Piece>) -> Vec<Piece> {
     /// Share of the size below which two faces are nearly one.
     const THIN: f64 = 1e-11;
@@ -564,7 +609,7 @@ fn without_gaps(pieces: Vec<Piece>) -> Vec<Piece> {
             let at = |[r, z, w]: HomogeneousPoint| [r / w, z / w];
             let (from, to) = (at(last.points[last.points.len() - 1]), at(piece.points[0]));
             let [across, along] = [0, 1].map(|k| (to[k] - from[k]).f64());
-            if along.abs() > THIN * size && along * direction > 0.0 {
+            if along.abs() > THIN * size && along * direction > 0.0 || along.abs() > GAP * size {
                 closed.push(Piece {
                     // Of no curve.
                     curve: usize::MAX,

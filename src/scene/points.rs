@@ -1,7 +1,7 @@
 //! Files that a scene names: points of a curve, `points = { file = "wall.csv" }`, and texts of splines.
 //!
-//! One point on a line: r, z and optionally the weight, with a comma or blanks between. What follows
-//! `#` is a comment; empty lines mean nothing.
+//! One point on a line: r, z and optionally the weight, with a comma or blanks between. The first line may be names
+//! of the columns. What follows `#` is a comment; empty lines mean nothing.
 
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -109,6 +109,7 @@ fn parse(text: &str, source: u32, limit: usize) -> Result<FilePoints, Fault> {
     let mut weights = Vec::new();
     let mut weight_place = None;
     let mut line_start = 0;
+    let mut header_allowed = true;
     for line in text.split_inclusive('\n') {
         let start = line_start;
         line_start += line.len();
@@ -117,6 +118,12 @@ fn parse(text: &str, source: u32, limit: usize) -> Result<FilePoints, Fault> {
             _ => (line, start),
         };
         let line = line.split('#').next().unwrap_or_default().trim_end();
+        if line.trim().is_empty() {
+            continue;
+        }
+        if std::mem::take(&mut header_allowed) && is_header(line) {
+            continue;
+        }
         let Some((numbers, count, places)) = parse_line(line, start, source)? else {
             continue;
         };
@@ -162,6 +169,21 @@ fn parse(text: &str, source: u32, limit: usize) -> Result<FilePoints, Fault> {
         weights: weight_place.map(|_| weights),
         weight_place: weight_place.unwrap_or(end),
     })
+}
+
+/// Whether a line is names of columns: two or three of them, of which none is a number or begins as one does.
+fn is_header(line: &str) -> bool {
+    let words: Vec<&str> = line
+        .split(',')
+        .flat_map(str::split_whitespace)
+        .take(4)
+        .collect();
+    let is_name = |word: &&str| {
+        let word = word.trim_matches('"');
+        let numeric = word.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        !word.is_empty() && !numeric && word.parse::<f64>().is_err()
+    };
+    (2..=3).contains(&words.len()) && words.iter().all(is_name)
 }
 
 /// Up to three numbers of a line that starts at byte `start` of the text; `None` for an empty line.

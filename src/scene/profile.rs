@@ -2,14 +2,16 @@
 
 use super::error::{At, Fault, Place, Sources, push_index, push_key};
 use super::fields::{
-    Fields, LENGTH, WEIGHT, boolean, choice, choices, each, elements, finite, integer, kinded,
-    length, missing, number, string, tuple,
+    Fields, LENGTH, WEIGHT, boolean, choice, choices, each, elements, find, finite, integer,
+    kinded, length, missing, number, string, tuple,
 };
 use super::keys;
 use super::limits::MAX_DEGREE;
-use super::model::{Boundary, CurveKind, CurveModel, Fill, PointModel, ProfileModel};
+use super::model::{Across, Boundary, CurveKind, CurveModel, Fill, PointModel, ProfileModel};
 use super::points::PointFiles;
-use super::value::{Kind, Value};
+use super::value::{Entry, Kind, Value};
+use crate::math::tolerance::GAP;
+use crate::region::MAX_GAP;
 
 /// Reads `[profiles.NAME]`, which is at `path`.
 pub(super) fn profile(
@@ -25,6 +27,11 @@ pub(super) fn profile(
     let fill = fields
         .read("fill", |value| choice(value, choices!(Fill)))?
         .unwrap_or(Fill::EvenOdd);
+    let gap = fields.read("gap", |value| {
+        let wanted = format!("a share of the profile's size from 0 to {MAX_GAP:e}");
+        number(value, &wanted, |x| (0.0..=MAX_GAP).contains(&x))
+    })?;
+    let across = fields.read("across", |value| choice(value, choices!(Across)))?;
     let mut inner = path.clone();
     push_key(&mut inner, "curves");
     let curves = fields.read("curves", |value| curves(value, &inner, files, sources))?;
@@ -64,6 +71,8 @@ pub(super) fn profile(
     Ok(ProfileModel {
         boundary,
         fill,
+        gap: gap.unwrap_or(GAP),
+        across: across.unwrap_or(Across::Refuse),
         curves,
         loops: loops.unwrap_or_default(),
         place: value.place,
@@ -79,10 +88,14 @@ fn curves(
 ) -> Result<Vec<CurveModel>, Fault> {
     let wanted = "an array of at least one curve";
     let list = match &value.kind {
-        Kind::Table(_) => {
-            return Err(value
-                .wrong_type(wanted)
-                .with_hint(Some(format!("in toml write [[{path}]], with two brackets"))));
+        Kind::Table(entries) => {
+            let hint = if path.ends_with(']') {
+                Some(loops_hint(entries))
+            } else {
+                let name = header(path);
+                name.map(|name| format!("in toml write [[{name}]], with two brackets"))
+            };
+            return Err(value.wrong_type(wanted).with_hint(hint));
         }
         _ => elements(value, wanted)?,
     };
@@ -94,6 +107,25 @@ fn curves(
         push_index(&mut path, index);
         curve(element, path, files, sources)
     })
+}
+
+/// What to write where a loop is a table.
+fn loops_hint(entries: &[Entry]) -> String {
+    let circle = "{ kind = \"circle\", center = [3, 0], radius = 1 }";
+    match (find(entries, "boundary"), find(entries, "kind")) {
+        (Some(_), _) => format!(
+            "a loop is an array of curves, loops = [[{circle}]]; boundary stands beside loops, and with \"to-axis\" the open chain is curves"
+        ),
+        (None, Some(_)) => format!("each loop has brackets of its own: loops = [[{circle}]]"),
+        _ => format!("a loop is an array of curves: loops = [[{circle}]]"),
+    }
+}
+
+/// A path as the header of a TOML table; none where a key cannot be shown as it is.
+fn header(path: &str) -> Option<&str> {
+    let whole = !path.contains("...") && !path.contains('\\');
+    let valid = || toml::de::DeTable::parse(&format!("[[{path}]]")).is_ok();
+    (whole && valid()).then_some(path)
 }
 
 fn curve(
@@ -115,7 +147,9 @@ fn curve(
             }
             let weights = weights(&fields, points.len(), file_weights)?;
             let knots = fields
-                .read("knots", |value| knots(value, points.len(), degree))?
+                .read("knots", |value| {
+                    knots(value, points.len(), degree, degree + 1)
+                })?
                 .unwrap_or_else(|| clamped_uniform(points.len(), degree));
             CurveKind::Nurbs {
                 degree,
@@ -141,14 +175,7 @@ fn curve(
         "polyline" => CurveKind::Polyline {
             points: unweighted_points(&fields, files, sources)?,
         },
-        "interpolate" => {
-            let points = unweighted_points(&fields, files, sources)?;
-            let degree = fields.read("degree", degree)?.unwrap_or(3);
-            CurveKind::Interpolate {
-                degree: degree.min(points.len() - 1),
-                points,
-            }
-        }
+        "interpolate" => interpolate(&fields, unweighted_points(&fields, files, sources)?)?,
         "arc" => {
             let center = center(&fields)?;
             let radius = fields.need("radius", LENGTH, length)?;
@@ -185,6 +212,52 @@ fn curve(
         reverse,
         place: value.place,
         path,
+    })
+}
+
+/// The spline through those points.
+fn interpolate(fields: &Fields<'_>, points: Vec<PointModel>) -> Result<CurveKind, Fault> {
+    let closed = fields.read("closed", boolean)?.unwrap_or(false);
+    let given = fields.read("degree", degree)?;
+    let refused = |key: &str, found: String, wanted: &str| {
+        let place = fields.get(key).map_or(fields.place(), |v| v.place);
+        Err(Fault::found(place, found, wanted).at_key(key))
+    };
+    let mut tangents = [None; 2];
+    for (tangent, key) in tangents.iter_mut().zip(["start-tangent", "end-tangent"]) {
+        *tangent = fields.read(key, |value| tuple(value, "a derivative [dr, dz]", finite))?;
+        if closed && tangent.is_some() {
+            let found = format!("`{key}` together with closed = true");
+            return refused(key, found, "either, since a closed curve has no ends");
+        }
+        if tangent.is_some() && given == Some(1) {
+            let found = format!("`{key}` together with degree = 1");
+            return refused(
+                key,
+                found,
+                "degree 2 or more, since segments have no tangent to choose",
+            );
+        }
+    }
+    let degree = given.unwrap_or(3);
+    if closed && points.len() < 3 {
+        let found = format!("{} points", points.len());
+        return refused("points", found, "at least 3 points for closed = true");
+    }
+    if closed && degree % 2 == 0 {
+        let wanted = "an odd degree for closed = true";
+        return refused("degree", degree.to_string(), wanted);
+    }
+    let conditions = points.len() + tangents.iter().flatten().count();
+    Ok(CurveKind::Interpolate {
+        degree: if closed {
+            degree
+        } else {
+            degree.min(conditions - 1)
+        },
+        points,
+        closed,
+        tangents,
     })
 }
 
@@ -291,7 +364,14 @@ fn weights(fields: &Fields<'_>, count: usize, from_file: FileWeights) -> Result<
 }
 
 /// A knot vector for that many points.
-pub(super) fn knots(value: &Value, points: usize, degree: usize) -> Result<Vec<f64>, Fault> {
+///
+/// * `inside`: how many knots may be equal inside the domain: `degree`, or one more where the curve may fall into two.
+pub(super) fn knots(
+    value: &Value,
+    points: usize,
+    degree: usize,
+    inside: usize,
+) -> Result<Vec<f64>, Fault> {
     let list = elements(value, "an array of numbers")?;
     let needed = points + degree + 1;
     if list.len() != needed {
@@ -327,12 +407,12 @@ pub(super) fn knots(value: &Value, points: usize, degree: usize) -> Result<Vec<f
             format!("knots with knots[{degree}] below knots[{points}]"),
         ));
     }
-    // Where degree + 1 knots inside the domain are equal, the curve falls apart.
-    for index in degree + 1..points {
+    // Where degree + 1 knots inside the domain are equal, what they are of falls apart.
+    for index in inside + 1..points {
         let knot = knots[index];
-        if knot > low && knot < high && knots[index - degree] == knot {
+        if knot > low && knot < high && knots[index - inside] == knot {
             let wanted =
-                format!("at most {degree} equal knots inside the domain, for degree {degree}");
+                format!("at most {inside} equal knots inside the domain, for degree {degree}");
             return Err(Fault::value(list[index].place, wanted).at_index(index));
         }
     }

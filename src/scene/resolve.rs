@@ -7,10 +7,11 @@
 use serde_json::{Map, Value, json};
 
 use super::model::{
-    AxisModel, CurveForm, CurveKind, CurveModel, GridModel, GridStep, OutputModel, PatchModel,
-    PlaceStep, PointModel, ProfileModel, ReferenceModel, SceneModel, SolidKind, SolidModel,
-    TurnModel, VolumeModel, VolumeSource,
+    Across, AxisModel, CurveForm, CurveKind, CurveModel, GridModel, GridStep, OutputModel,
+    PatchModel, PlaceStep, PointModel, ProfileModel, ReferenceModel, SceneModel, SolidKind,
+    SolidModel, TurnModel, VolumeModel, VolumeSource,
 };
+use crate::math::tolerance::GAP;
 use crate::solid::Shape;
 
 impl SceneModel {
@@ -163,6 +164,11 @@ fn object<const N: usize>(entries: [(&str, Value); N]) -> Value {
     )
 }
 
+/// Nothing where `plain`, else the value.
+fn unless(plain: bool, value: Value) -> Value {
+    if plain { Value::Null } else { value }
+}
+
 fn grid(model: &GridModel) -> Value {
     let (resolution, spacing, origin, dims) = match model.step {
         GridStep::Resolution(n) => (json!(n), Value::Null, Value::Null, Value::Null),
@@ -208,6 +214,12 @@ fn profile(model: &ProfileModel) -> Value {
     object([
         ("boundary", json!(model.boundary.name())),
         ("fill", json!(model.fill.name())),
+        // What was not asked for stays out, so that scenes keep the hash they had.
+        ("gap", unless(model.gap == GAP, json!(model.gap))),
+        (
+            "across",
+            unless(model.across == Across::Refuse, json!(model.across.name())),
+        ),
         ("curves", model.curves.as_ref().map_or(Value::Null, chain)),
         ("loops", loops),
     ])
@@ -274,11 +286,19 @@ fn curve(model: &CurveModel) -> Value {
             ("radii", json!(radii)),
             ("tilt", json!(tilt)),
         ]),
-        CurveKind::Interpolate { points: p, degree } => object([
+        CurveKind::Interpolate {
+            points: p,
+            degree,
+            closed,
+            tangents: [start, end],
+        } => object([
             ("kind", json!("interpolate")),
             reverse,
             ("points", points(p)),
             ("degree", json!(degree)),
+            ("closed", unless(!closed, json!(closed))),
+            ("start-tangent", json!(start)),
+            ("end-tangent", json!(end)),
         ]),
     }
 }
@@ -333,5 +353,6 @@ fn step(step: &PlaceStep) -> Value {
             object([("axis", json!(axis)), ("degrees", json!(degrees))]),
         )]),
         PlaceStep::Translate(by) => object([("translate", json!(by))]),
+        PlaceStep::Mirror(normal) => object([("mirror", json!(normal))]),
     }
 }

@@ -6,8 +6,12 @@
 use serde_json::{Map, Value, json};
 
 use super::limits::{MAX_DEGREE, MAX_MAGNITUDE, MAX_NAME, MAX_VOXELS, MIN_MAGNITUDE};
-use super::model::{Boundary, ChannelName, CompressionName, Fill, FormatName, Operation, Units};
+use super::model::{
+    Across, Boundary, ChannelName, CompressionName, Fill, FormatName, Operation, Units,
+};
 use super::read::{DEFAULT_PADDING, DEFAULT_RESOLUTION};
+use crate::math::tolerance::GAP;
+use crate::region::MAX_GAP;
 
 /// JSON Schema (draft 2020-12) of the scene file.
 pub fn json_schema() -> Value {
@@ -312,6 +316,26 @@ fn profile() -> Value {
                 ),
             ),
             (
+                "gap",
+                json!({
+                    "description": "Share of the profile's size up to which a gap between consecutive curves is closed by a segment.",
+                    "type": "number",
+                    "minimum": 0,
+                    "maximum": MAX_GAP,
+                    "default": GAP,
+                }),
+            ),
+            (
+                "across",
+                with_default(
+                    names(
+                        "What becomes of curves at r < 0; clip: what lies at r >= 0 is taken; mirror: the union with the mirror image.",
+                        Across::ALL.iter().map(|n| n.name()),
+                    ),
+                    json!("refuse"),
+                ),
+            ),
+            (
                 "curves",
                 curves("Curves in order, head to tail: the loop, or the open chain."),
             ),
@@ -379,6 +403,7 @@ fn curve_kinds() -> Value {
     };
     #[allow(clippy::cast_possible_truncation, reason = "32")]
     let degree = || integer("Degree, below the number of points.", 1, MAX_DEGREE as u32);
+    let derivative = "Derivative [dr, dz] by chord length, of an open curve.";
     let center = || ("center", point("Centre [r, z]."));
     let radius = || ("radius", length("Radius."));
     let mut bezier_points = points().1;
@@ -462,13 +487,23 @@ fn curve_kinds() -> Value {
             ],
         ),
         object(
-            "The clamped spline through the points.",
+            "The spline through the points.",
             &["kind", "points"],
             [
                 kind("interpolate"),
                 reverse(),
                 points(),
                 ("degree", with_default(degree(), json!(3))),
+                (
+                    "closed",
+                    json!({
+                        "description": "Back to the first point, which is not repeated, smoothly; needs an odd degree.",
+                        "type": "boolean",
+                        "default": false,
+                    }),
+                ),
+                ("start-tangent", point(derivative)),
+                ("end-tangent", point(derivative)),
             ],
         ),
     ])
@@ -520,6 +555,10 @@ fn place() -> Value {
                     step("scale", length("Scale about the origin.")),
                     step("rotate", rotate),
                     step("translate", vector("Move by this vector.")),
+                    step(
+                        "mirror",
+                        vector("Normal, not zero, of the plane through the origin to reflect in."),
+                    ),
                 ]),
             ),
         ),
@@ -609,10 +648,11 @@ fn solid_property(kind: &str, key: &str) -> Value {
         "kind" => json!({ "const": kind, "description": "Kind of solid." }),
         "profile" => json!({ "description": "Name of the profile.", "type": "string" }),
         "angle" => json!({
-            "description": "Degrees turned; flat caps close a partial turn.",
+            "description": "Degrees turned, negative: clockwise; not 0. Flat caps close a partial turn.",
             "type": "number",
-            "minimum": MIN_MAGNITUDE,
+            "minimum": -360,
             "maximum": 360,
+            "not": { "exclusiveMinimum": -MIN_MAGNITUDE, "exclusiveMaximum": MIN_MAGNITUDE },
             "default": 360,
         }),
         "start" => with_default(number("Degrees where the turn starts."), json!(0)),

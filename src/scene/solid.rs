@@ -142,8 +142,9 @@ pub(super) fn profile(
 /// How far something is turned, and from where.
 pub(super) fn turn(fields: &Fields) -> Result<TurnModel, Fault> {
     let angle = fields.read("angle", |value| {
-        number(value, "an angle greater than 0 and at most 360", |x| {
-            (MIN_MAGNITUDE..=360.0).contains(&x)
+        let wanted = "an angle other than 0, of at most 360 either way";
+        number(value, wanted, |x| {
+            (MIN_MAGNITUDE..=360.0).contains(&x.abs())
         })
     })?;
     Ok(TurnModel {
@@ -207,7 +208,7 @@ fn axis(value: &Value) -> Result<AxisModel, Fault> {
 }
 
 fn step(value: &Value) -> Result<PlaceStep, Fault> {
-    let wanted = "a step: a table of one of scale, rotate, translate";
+    let wanted = "a step: a table of one of scale, rotate, translate, mirror";
     let fields = Fields::new(value, keys::STEP, wanted)?;
     let scale = fields.read("scale", |value| {
         number(value, "a factor greater than 0 (1e-100 to 1e100)", |x| {
@@ -223,9 +224,11 @@ fn step(value: &Value) -> Result<PlaceStep, Fault> {
         })
     })?;
     let translate = fields.read("translate", |value| vector(value).map(PlaceStep::Translate))?;
-    match (scale, rotate, translate) {
-        (Some(step), None, None) | (None, Some(step), None) | (None, None, Some(step)) => Ok(step),
-        (None, None, None) => Err(Fault::found(value.place, "an empty step", wanted)),
+    let mirror = fields.read("mirror", |value| direction(value).map(PlaceStep::Mirror))?;
+    let mut steps = [scale, rotate, translate, mirror].into_iter().flatten();
+    match (steps.next(), steps.next()) {
+        (Some(step), None) => Ok(step),
+        (None, _) => Err(Fault::found(value.place, "an empty step", wanted)),
         _ => Err(Fault::found(
             value.place,
             "several keys in one step",

@@ -13,7 +13,7 @@ use super::points::PointFiles;
 use super::profile::knots;
 use super::solid::{profile, turn};
 use super::value::{Kind, Value};
-use crate::exchange::{self, Spline};
+use crate::exchange;
 use crate::nurbs::NurbsVolume;
 use std::path::Path;
 
@@ -153,7 +153,7 @@ fn net<const N: usize, const D: usize>(
                 let wanted = format!("at least {least} for degree {}", degrees[k]);
                 return Err(Fault::found(value.place, found, wanted).at_index(k));
             }
-            all[k] = knots(value, count - degrees[k] - 1, degrees[k]).at_index(k)?;
+            all[k] = knots(value, count - degrees[k] - 1, degrees[k], degrees[k]).at_index(k)?;
         }
         Ok(all)
     })?;
@@ -288,17 +288,12 @@ fn file(value: &Value, context: &mut Context) -> Result<VolumeModel, Fault> {
     let refused = |reason: String| Fault::found(value.place, format!("{name}: {reason}"), wanted);
     let reading =
         exchange::read_bytes(Path::new(name), &bytes).map_err(|e| refused(e.to_string()))?;
-    let mut patches = Vec::new();
-    for (index, spline) in reading.splines.iter().enumerate() {
-        let Spline::Volume(volume) = spline else {
-            return Err(refused(format!("spline {index} is a {}", spline.kind())));
-        };
-        patches.push(of_volume(volume, value));
-    }
+    let (volumes, notes) = reading.into_volumes().map_err(|e| refused(e.to_string()))?;
+    let patches: Vec<_> = volumes.iter().map(|v| of_volume(v, value)).collect();
     if patches.is_empty() {
         return Err(refused("no spline".to_owned()));
     }
-    let notes = reading.notes.iter().map(|note| format!("{name}: {note}"));
+    let notes = notes.iter().map(|note| format!("{name}: {note}"));
     Ok(VolumeModel {
         source: VolumeSource::Patches(patches),
         notes: notes.collect(),

@@ -31,26 +31,45 @@ pub struct Wedge {
     /// Angle turned, in degrees.
     degrees: f64,
     /// Where the turn starts, in degrees.
-    from: f64,
+    from: Dd,
 }
 
 impl Turn {
-    /// A turn by `degrees` (more than 0, at most 360) from `from` degrees.
+    /// A turn by `degrees` (not 0, at most 360 either way; negative: clockwise) from `from` degrees.
     #[must_use]
     pub fn new(from: f64, degrees: f64) -> Self {
-        if degrees >= 360.0 {
+        if degrees.abs() >= 360.0 {
             return Self::Full;
         }
         let direction = |a: Dd| {
             let (s, c) = a.sin_cos_degrees();
             [c, s]
         };
+        let [mut start, mut end] = [Dd::of(from), Dd::sum(from, degrees)];
+        if degrees < 0.0 {
+            std::mem::swap(&mut start, &mut end);
+        }
         Self::Partial(Wedge {
-            start: direction(Dd::of(from)),
-            end: direction(Dd::sum(from, degrees)),
-            degrees,
-            from,
+            start: direction(start),
+            end: direction(end),
+            degrees: degrees.abs(),
+            from: start,
         })
+    }
+
+    /// The mirror image in the plane of the zero angle and the axis.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let image = |[c, s]: [Dd; 2]| [c, -s];
+        match self {
+            Self::Full => Self::Full,
+            Self::Partial(w) => Self::Partial(Wedge {
+                start: image(w.end),
+                end: image(w.start),
+                degrees: w.degrees,
+                from: -(w.from + Dd::of(w.degrees)),
+            }),
+        }
     }
 
     /// The angle turned, in degrees.
@@ -95,7 +114,7 @@ impl Turn {
         match self {
             Self::Full => [Dd::ONE, Dd::ZERO],
             Self::Partial(w) => {
-                let (s, c) = Dd::sum(w.from, 0.5 * w.degrees).sin_cos_degrees();
+                let (s, c) = (w.from + Dd::of(0.5 * w.degrees)).sin_cos_degrees();
                 [c, s]
             }
         }
@@ -112,7 +131,7 @@ impl Wedge {
     /// Where the turn starts, in degrees.
     #[must_use]
     pub fn from(&self) -> f64 {
-        self.from
+        self.from.f64()
     }
 
     /// Unit vectors along the two caps.

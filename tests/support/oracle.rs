@@ -286,7 +286,7 @@ fn pieces_of(curve: &CurveModel) -> Vec<Piece> {
             radii,
             tilt,
         } => place(circle(), *center, *radii, *tilt),
-        CurveKind::Interpolate { points, degree } => {
+        CurveKind::Interpolate { points, degree, .. } => {
             let points: Vec<[Big; 2]> = points.iter().map(point).collect();
             interpolate(&points, *degree)
         }

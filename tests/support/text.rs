@@ -136,7 +136,7 @@ fn curve_text(curve: &CurveModel, scale: f64) -> String {
             pair(center),
             pair(radii)
         ),
-        CurveKind::Interpolate { points, degree } => {
+        CurveKind::Interpolate { points, degree, .. } => {
             format!(
                 "kind = 'interpolate', points = {}, degree = {degree}",
                 list(points)

@@ -47,6 +47,18 @@ fn errors_in_files_of_points_name_the_file() {
             "wall.csv:2:1: profiles.ring.curves[0].points.file: found r, wanted a finite number of magnitude at most 1e100",
         ),
         (
+            "r, z\nr, z\n",
+            "wall.csv:2:1: profiles.ring.curves[0].points.file: found r, wanted a finite number of magnitude at most 1e100",
+        ),
+        (
+            "\"2\",\"0\"\n3,1\n",
+            "wall.csv:1:1: profiles.ring.curves[0].points.file: found \"2\", wanted a finite number of magnitude at most 1e100",
+        ),
+        (
+            "r\n3,1\n",
+            "wall.csv:1:1: profiles.ring.curves[0].points.file: found r, wanted a finite number of magnitude at most 1e100",
+        ),
+        (
             "1 0\n1\n",
             "wall.csv:2:1: profiles.ring.curves[0].points.file: found one number on the line, wanted r and z, and optionally a weight",
         ),

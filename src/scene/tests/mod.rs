@@ -61,7 +61,11 @@ degree = 2
   [{ kind = "circle", center = [5, 0], radius = 1, reverse = true }],
   [{ kind = "ellipse", center = [5, 0], radii = [2, 3], tilt = 30 }],
   [{ kind = "arc", center = [5, 0], radius = 4, from = 350, to = 90 }],
+  [{ kind = "interpolate", points = [[5, 0], [6, 0], [6, 1]], closed = true, degree = 5 }],
+  [{ kind = "interpolate", points = [[5, 0], [6, 0]], start-tangent = [0.5, 0], end-tangent = [0, 0.001] }],
 ]
+"my bowl".gap = 1e-7
+"my bowl".across = "mirror"
 
 [[solid]]
 name = "glass"
@@ -70,7 +74,7 @@ profile = "chain"
 angle = 270
 start = -45
 axis = { origin = [1, 2, 3], direction = [0, 1, 1], x = [1, 0, 0] }
-place = [{ scale = 2 }, { rotate = { axis = [1, 0, 0], degrees = 30 } }, { translate = [0, 0, 5] }]
+place = [{ scale = 2 }, { rotate = { axis = [1, 0, 0], degrees = 30 } }, { translate = [0, 0, 5] }, { mirror = [1, 0, 0.5] }]
 operation = "add"
 material = 7
 

@@ -9,7 +9,7 @@ fn solids_are_checked() {
         refuses(
             &with(&format!("angle = {bad}")),
             &format!(
-                "vase.toml:9:9: solid[0].angle: found {bad}, wanted an angle greater than 0 and at most 360"
+                "vase.toml:9:9: solid[0].angle: found {bad}, wanted an angle other than 0, of at most 360 either way"
             ),
         );
     }
