@@ -47,6 +47,20 @@ pub struct NearestFace {
     pub gap: f64,
 }
 
+/// A nearly flat part of an outer face: control points (w x, w y, w z, w) times `unit`, from `origin`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FacePart<'a> {
+    pub(crate) degrees: [usize; 2],
+    /// The first index fastest.
+    pub(crate) points: &'a [[f64; 4]],
+    pub(crate) origin: DVec3,
+    pub(crate) unit: f64,
+    /// As [`OuterFace::outward`].
+    pub(crate) outward: i8,
+    /// How far a control point may be from the face's own, in model units.
+    pub(crate) slack: f64,
+}
+
 /// Distance from the middle, in units, beyond which points are taken along their direction.
 const FAR: f64 = (1_u32 << 20) as f64;
 
@@ -197,6 +211,35 @@ impl FaceSet {
             found.set(found.get() || !apart);
         });
         found.get()
+    }
+
+    /// Calls `each` with the parts of the outer faces whose boxes pass `keep`, which is asked for the middle, seen from
+    /// `from`, and the half extents of boxes around parts, in model units.
+    pub(crate) fn parts(
+        &self,
+        from: DVec3,
+        keep: impl Fn(DVec3, DVec3) -> bool,
+        mut each: impl FnMut(&FacePart),
+    ) {
+        let unit = self.frame.unit;
+        let centre = self.frame.centre - from;
+        let passes = |b: &Box3| {
+            let (low, high) = (DVec3::from_array(b.min), DVec3::from_array(b.max));
+            let half = 0.5 * (high - low) + SubPatch::MOST_SLACK;
+            keep(centre + 0.5 * (low + high) * unit, half * unit)
+        };
+        self.tree.visit(passes, |i| {
+            let part = &self.tree.parts[i];
+            let outward = self.faces.get(part.face as usize).map_or(0, |f| f.outward);
+            each(&FacePart {
+                degrees: part.net.degrees,
+                points: &part.net.points,
+                origin: centre + DVec3::from_array(part.origin) * unit,
+                unit,
+                outward,
+                slack: part.slack() * unit,
+            });
+        });
     }
 
     /// Calls `each(a, b)` with closed intervals that together hold every s in `range` at which

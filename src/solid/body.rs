@@ -170,7 +170,10 @@ impl Body {
                 b.fraction_within(shape, centre, spaces, tolerance)
             }
             (Self::Block(b), _) => b.fraction_within(voxel.sides, centre, spaces),
-            (Self::Patches(b), _) => b.fraction_within(voxel.sides, centre, spaces, tolerance),
+            (Self::Patches(b), _) => b
+                .fraction_within(voxel.sides, centre, spaces, tolerance)
+                .value
+                .clamp(0.0, 1.0),
             // A shape is made by the body that uses it.
             _ => 0.0,
         }

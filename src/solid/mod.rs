@@ -13,11 +13,12 @@ mod coaxial;
 mod composite;
 mod ellipsoid;
 mod faces;
+mod flux;
 mod fraction;
 mod measure;
 mod part;
 mod patch_fraction;
-mod patch_voxel;
+
 mod patches;
 mod path;
 mod revolved;

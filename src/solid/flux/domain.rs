@@ -1,0 +1,276 @@
+//! A cell as the integrand of a surface integral.
+//!
+//! The cell is the box |x|, |y|, |z| <= ½ and half-spaces. The line through a point along -x leaves of it the length
+//!
+//! ```text
+//!   L = max(0, min_ij (T_i - F_j)),     T_i in {x, ½, tops},  F_j in {-½, floors}
+//! ```
+//!
+//! where (y, z) is within the sides: planes that hold the direction x. Tops and floors are the other planes as
+//! functions of y and z. L is continuous and linear in pieces but for the jumps at the sides.
+
+use super::net::Net;
+use crate::math::tetrahedra::HalfSpace;
+use smallvec::SmallVec;
+
+/// a x + b y + c z + d.
+pub(super) type Form = [f64; 4];
+
+/// Slope of a plane against x, as a share of its normal, below which it counts as a side.
+const SIDE: f64 = 1e-13;
+
+/// What bounds a cell, seen along x.
+#[derive(Debug, Clone)]
+pub(super) struct Domain {
+    /// At most 0 within.
+    sides: SmallVec<[Form; 8]>,
+    tops: SmallVec<[Form; 8]>,
+    floors: SmallVec<[Form; 8]>,
+}
+
+/// A function whose zero cuts a patch, and L on both sides of it; `None` is 0.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cut {
+    pub(super) form: Form,
+    pub(super) below: Option<Form>,
+    pub(super) above: Option<Form>,
+}
+
+/// What L is on a patch.
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    /// 0, but for the places that roundings may decide.
+    Nothing,
+    Whole(Form),
+    /// One function changes sign.
+    Cut(Cut),
+    /// Several do.
+    Several,
+}
+
+/// L on a patch, and what is known of it without its kind.
+#[derive(Debug, Clone)]
+pub(super) struct Look {
+    pub(super) kind: Kind,
+    /// A bound of L.
+    pub(super) most: f64,
+    /// The linear function nearest to L where no side cuts the patch, and how far it is off at most.
+    pub(super) nearest: Option<(Form, f64)>,
+    /// Functions that change sign.
+    pub(super) open: SmallVec<[Form; 8]>,
+    /// How far L or the place of a side may be misjudged; 0 where nothing was near.
+    pub(super) slack: f64,
+}
+
+/// Cartesian control points.
+pub(super) type Hull = SmallVec<[[f64; 3]; 16]>;
+
+/// The range of a form over the control points, which holds that over the patch.
+pub(super) fn range(form: &Form, hull: &Hull) -> [f64; 2] {
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for p in hull {
+        let value = value(form, p);
+        range = [range[0].min(value), range[1].max(value)];
+    }
+    range
+}
+
+pub(super) fn value(form: &Form, p: &[f64; 3]) -> f64 {
+    form[0] * p[0] + form[1] * p[1] + form[2] * p[2] + form[3]
+}
+
+fn minus(a: &Form, b: &Form) -> Form {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+/// Rounding of a form's value where coordinates are off by `slack`.
+fn rounding(form: &Form, slack: f64) -> f64 {
+    slack * (form[0].abs() + form[1].abs() + form[2].abs()) + 4.0 * f64::EPSILON * form[3].abs()
+}
+
+impl Domain {
+    /// The cell within half-spaces, given in its coordinates.
+    pub(super) fn new(spaces: &[HalfSpace]) -> Self {
+        let mut domain = Self {
+            sides: SmallVec::new(),
+            tops: SmallVec::from_slice(&[[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5]]),
+            floors: SmallVec::from_slice(&[[0.0, 0.0, 0.0, -0.5]]),
+        };
+        for k in [1, 2] {
+            for sign in [1.0, -1.0] {
+                let mut form = [0.0, 0.0, 0.0, -0.5];
+                form[k] = sign;
+                domain.sides.push(form);
+            }
+        }
+        for space in spaces {
+            let n = space.normal;
+            let length = n.length();
+            if n.x.abs() <= SIDE * length {
+                let unit = if length > 0.0 { 1.0 / length } else { 1.0 };
+                let form = [0.0, n.y, n.z, -space.offset];
+                domain.sides.push(form.map(|c| c * unit));
+                continue;
+            }
+            let form = [0.0, -n.y / n.x, -n.z / n.x, space.offset / n.x];
+            if n.x > 0.0 {
+                domain.tops.push(form);
+            } else {
+                domain.floors.push(form);
+            }
+        }
+        domain
+    }
+
+    /// The steepest of the tops and floors: how badly this direction suits the half-spaces.
+    pub(super) fn steepness(&self) -> f64 {
+        let forms = self.tops.iter().chain(&self.floors);
+        forms.fold(0.0, |m, f| f[1].abs().max(f[2].abs()).max(m))
+    }
+
+    /// What L is on a patch with these control points.
+    pub(super) fn look(&self, hull: &Hull, slack: f64) -> Look {
+        let mut look = Look {
+            kind: Kind::Nothing,
+            most: 0.0,
+            nearest: None,
+            open: SmallVec::new(),
+            slack: 0.0,
+        };
+        for side in &self.sides {
+            let [low, high] = range(side, hull);
+            let room = rounding(side, slack);
+            if low >= -room {
+                if low <= room {
+                    look.slack = room;
+                }
+                return look;
+            }
+            if high > room {
+                look.open.push(*side);
+            } else if high > -room {
+                look.slack = look.slack.max(room);
+            }
+        }
+        let sides = look.open.len();
+        let tops = lowest(&self.tops, hull, slack, 1.0, &mut look.slack);
+        let floors = lowest(&self.floors, hull, slack, -1.0, &mut look.slack);
+        // A length is at most 1, and at most each difference.
+        look.most = 1.0;
+        let mut positive = true;
+        for top in &tops {
+            for floor in &floors {
+                let form = minus(top, floor);
+                let [low, high] = range(&form, hull);
+                let room = rounding(&form, slack);
+                if high <= room {
+                    look.slack = look.slack.max(room);
+                    look.most = 0.0;
+                    return look;
+                }
+                look.most = look.most.min(high);
+                if low < -room {
+                    positive = false;
+                    look.open.push(form);
+                } else if low < room {
+                    look.slack = look.slack.max(room);
+                }
+            }
+        }
+        for list in [&tops, &floors] {
+            for (i, a) in list.iter().enumerate() {
+                look.open.extend(list[..i].iter().map(|b| minus(a, b)));
+            }
+        }
+        if sides == 0 && !look.open.is_empty() {
+            look.nearest = nearest(&tops, &floors, hull);
+        }
+        let length = minus(&tops[0], &floors[0]);
+        look.kind = match (look.open.as_slice(), tops.as_slice(), floors.as_slice()) {
+            ([], _, _) => Kind::Whole(length),
+            (&[form], &[_], &[_]) if positive => Kind::Cut(Cut {
+                form,
+                below: Some(length),
+                above: None,
+            }),
+            (&[form], &[_], &[_]) if sides == 0 => Kind::Cut(Cut {
+                form,
+                below: None,
+                above: Some(length),
+            }),
+            (&[_], &[a, b], &[floor]) => Kind::Cut(Cut {
+                form: minus(&b, &a),
+                below: Some(minus(&b, &floor)),
+                above: Some(minus(&a, &floor)),
+            }),
+            (&[_], &[top], &[a, b]) => Kind::Cut(Cut {
+                form: minus(&b, &a),
+                below: Some(minus(&top, &a)),
+                above: Some(minus(&top, &b)),
+            }),
+            _ => Kind::Several,
+        };
+        look
+    }
+}
+
+/// The forms, times `sign`, that may be the lowest somewhere on a patch.
+fn lowest(
+    forms: &[Form],
+    hull: &Hull,
+    slack: f64,
+    sign: f64,
+    misjudged: &mut f64,
+) -> SmallVec<[Form; 4]> {
+    let mut left: SmallVec<[Form; 4]> = SmallVec::new();
+    for form in forms {
+        let above = |other: &Form, by: &Form| {
+            let d = minus(other, by).map(|c| c * sign);
+            let [low, _] = range(&d, hull);
+            let room = rounding(&d, slack);
+            (low >= -room).then_some(if low <= room { room } else { 0.0 })
+        };
+        if let Some(room) = left.iter().find_map(|other| above(form, other)) {
+            *misjudged = misjudged.max(room);
+            continue;
+        }
+        left.retain(|other| match above(other, form) {
+            Some(room) => {
+                *misjudged = misjudged.max(room);
+                false
+            }
+            None => true,
+        });
+        left.push(*form);
+    }
+    left
+}
+
+/// Of the lengths, and 0, that from which L deviates least.
+fn nearest(tops: &[Form], floors: &[Form], hull: &Hull) -> Option<(Form, f64)> {
+    let mut all: SmallVec<[Form; 8]> = SmallVec::new();
+    for top in tops {
+        all.extend(floors.iter().map(|floor| minus(top, floor)));
+    }
+    let above = |a: &Form, b: &Form| range(&minus(a, b), hull)[1].max(0.0);
+    let zero = [0.0; 4];
+    let off = all.iter().map(|form| {
+        // Of L = max(0, min of all): below the form by what the others are, above it where that is negative.
+        let below = all
+            .iter()
+            .fold(0.0, |m: f64, other| m.max(above(form, other)));
+        (*form, below.max(above(&zero, form)))
+    });
+    off.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Cartesian control points of a patch.
+pub(super) fn hull(net: &Net) -> Hull {
+    let points = net.points.iter();
+    points
+        .map(|h| {
+            let w = 1.0 / h[3];
+            [h[0] * w, h[1] * w, h[2] * w]
+        })
+        .collect()
+}
