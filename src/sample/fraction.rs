@@ -78,7 +78,9 @@ impl FractionSampler {
                     [term] if term.factors.len() == 1 => {
                         let one = term.factors[0];
                         let shape = &self.shapes[one.body];
-                        let share = bodies[one.body].fraction_within(shape, centre, &[], TOLERANCE);
+                        let share = bodies[one.body]
+                            .fraction_within(shape, centre, &[], TOLERANCE)
+                            .value;
                         if one.complement { 1.0 - share } else { share }
                     }
                     several => divided::share(assembly, several, centre, self.sides),

@@ -11,7 +11,7 @@
 
 use super::block::Block;
 use super::ellipsoid::Ellipsoid;
-use super::fraction::CellShape;
+use super::fraction::{CellShape, SNAP};
 use super::measure::{Measures, Moments};
 use super::patches::Patches;
 use super::path::Stretch;
@@ -155,27 +155,36 @@ impl Body {
     }
 
     /// The share of the voxel centred on `centre` that lies in the solid and in all the half-spaces,
-    /// which are given from the voxel's centre; each stretch of a surface within an estimated error
-    /// of `tolerance`.
+    /// which are given from the voxel's centre, with its error: a proved bound of at most `tolerance` where that is
+    /// within the budget or, where a voxel stands upright on the axis of a turned solid, an estimate of each
+    /// stretch of a surface.
     pub(crate) fn fraction_within(
         &self,
         voxel: &VoxelShape,
         centre: DVec3,
         spaces: &[HalfSpace],
         tolerance: f64,
-    ) -> f64 {
-        match (self, &voxel.sections) {
+    ) -> Integral {
+        let found = match (self, &voxel.sections) {
             (Self::Revolved(b), Some(shape)) => b.fraction_within(shape, centre, spaces, tolerance),
             (Self::Ellipsoid(b), Some(shape)) => {
                 b.fraction_within(shape, centre, spaces, tolerance)
             }
             (Self::Block(b), _) => b.fraction_within(voxel.sides, centre, spaces),
-            (Self::Patches(b), _) => b
-                .fraction_within(voxel.sides, centre, spaces, tolerance)
-                .value
-                .clamp(0.0, 1.0),
+            (Self::Patches(b), _) => b.fraction_within(voxel.sides, centre, spaces, tolerance),
             // A shape is made by the body that uses it.
-            _ => 0.0,
+            _ => Integral::default(),
+        };
+        let value = found.value;
+        Integral {
+            value: if value < SNAP {
+                0.0
+            } else if value > 1.0 - SNAP {
+                1.0
+            } else {
+                value
+            },
+            error: found.error,
         }
     }
 

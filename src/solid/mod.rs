@@ -16,6 +16,7 @@ mod faces;
 mod flux;
 mod fraction;
 mod measure;
+mod oblique;
 mod part;
 mod patch_fraction;
 

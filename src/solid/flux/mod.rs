@@ -26,9 +26,11 @@
 
 mod domain;
 mod net;
+mod place;
 mod proof;
 
 pub(super) use net::Net;
+pub(super) use place::Place;
 
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::HalfSpace;
@@ -125,14 +127,6 @@ pub(super) fn share(nets: &[Net], spaces: &[HalfSpace], goal: f64) -> Integral {
         }
     }
     best.unwrap_or_default()
-}
-
-/// A half-space from a voxel's centre in the coordinates of the voxel with those sides.
-pub(super) fn in_cell(space: &HalfSpace, sides: DVec3) -> HalfSpace {
-    HalfSpace {
-        normal: space.normal * sides,
-        offset: space.offset,
-    }
 }
 
 /// An axis of the cube that L is measured along.
