@@ -28,27 +28,17 @@ pub(super) struct Domain {
     floors: SmallVec<[Form; 8]>,
 }
 
-/// A function whose zero cuts a patch, and L on both sides of it; `None` is 0.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cut {
-    pub(super) form: Form,
-    pub(super) below: Option<Form>,
-    pub(super) above: Option<Form>,
-}
-
 /// What L is on a patch.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
     /// 0, but for the places that roundings may decide.
     Nothing,
     Whole(Form),
-    /// One function changes sign.
-    Cut(Cut),
-    /// Several do.
-    Several,
+    /// Functions change sign.
+    Open,
 }
 
-/// L on a patch, and what is known of it without its kind.
+/// L on a patch.
 #[derive(Debug, Clone)]
 pub(super) struct Look {
     pub(super) kind: Kind,
@@ -56,10 +46,31 @@ pub(super) struct Look {
     pub(super) most: f64,
     /// The linear function nearest to L where no side cuts the patch, and how far it is off at most.
     pub(super) nearest: Option<(Form, f64)>,
-    /// Functions that change sign.
+    /// Functions that change sign: between their zeros L is linear.
     pub(super) open: SmallVec<[Form; 8]>,
+    /// How many of these are sides; the first.
+    sides: usize,
+    /// What may be the lowest top and the highest floor.
+    tops: Forms,
+    floors: Forms,
     /// How far L or the place of a side may be misjudged; 0 where nothing was near.
     pub(super) slack: f64,
+}
+
+type Forms = SmallVec<[Form; 4]>;
+
+impl Look {
+    /// L about a point of the patch, where no function is 0; `None` where it is 0.
+    pub(super) fn form_at(&self, p: &[f64; 3]) -> Option<Form> {
+        if self.open[..self.sides].iter().any(|s| value(s, p) > 0.0) {
+            return None;
+        }
+        let of = |form: &&Form| value(form, p);
+        let top = self.tops.iter().min_by(|a, b| of(a).total_cmp(&of(b)))?;
+        let floor = self.floors.iter().max_by(|a, b| of(a).total_cmp(&of(b)))?;
+        let form = minus(top, floor);
+        (value(&form, p) > 0.0).then_some(form)
+    }
 }
 
 /// Cartesian control points.
@@ -77,6 +88,15 @@ pub(super) fn range(form: &Form, hull: &Hull) -> [f64; 2] {
 
 pub(super) fn value(form: &Form, p: &[f64; 3]) -> f64 {
     form[0] * p[0] + form[1] * p[1] + form[2] * p[2] + form[3]
+}
+
+/// Adds a plane that is not there yet.
+fn add(forms: &mut SmallVec<[Form; 8]>, form: Form) {
+    let size = form.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let same = |other: &Form| (0..4).all(|k| (other[k] - form[k]).abs() <= 1e-15 * size);
+    if !forms.iter().any(same) {
+        forms.push(form);
+    }
 }
 
 fn minus(a: &Form, b: &Form) -> Form {
@@ -109,14 +129,14 @@ impl Domain {
             if n.x.abs() <= SIDE * length {
                 let unit = if length > 0.0 { 1.0 / length } else { 1.0 };
                 let form = [0.0, n.y, n.z, -space.offset];
-                domain.sides.push(form.map(|c| c * unit));
+                add(&mut domain.sides, form.map(|c| c * unit));
                 continue;
             }
             let form = [0.0, -n.y / n.x, -n.z / n.x, space.offset / n.x];
             if n.x > 0.0 {
-                domain.tops.push(form);
+                add(&mut domain.tops, form);
             } else {
-                domain.floors.push(form);
+                add(&mut domain.floors, form);
             }
         }
         domain
@@ -135,6 +155,9 @@ impl Domain {
             most: 0.0,
             nearest: None,
             open: SmallVec::new(),
+            sides: 0,
+            tops: Forms::new(),
+            floors: Forms::new(),
             slack: 0.0,
         };
         for side in &self.sides {
@@ -152,12 +175,11 @@ impl Domain {
                 look.slack = look.slack.max(room);
             }
         }
-        let sides = look.open.len();
+        look.sides = look.open.len();
         let tops = lowest(&self.tops, hull, slack, 1.0, &mut look.slack);
         let floors = lowest(&self.floors, hull, slack, -1.0, &mut look.slack);
         // A length is at most 1, and at most each difference.
         look.most = 1.0;
-        let mut positive = true;
         for top in &tops {
             for floor in &floors {
                 let form = minus(top, floor);
@@ -170,7 +192,6 @@ impl Domain {
                 }
                 look.most = look.most.min(high);
                 if low < -room {
-                    positive = false;
                     look.open.push(form);
                 } else if low < room {
                     look.slack = look.slack.max(room);
@@ -182,47 +203,22 @@ impl Domain {
                 look.open.extend(list[..i].iter().map(|b| minus(a, b)));
             }
         }
-        if sides == 0 && !look.open.is_empty() {
+        if look.sides == 0 && !look.open.is_empty() {
             look.nearest = nearest(&tops, &floors, hull);
         }
-        let length = minus(&tops[0], &floors[0]);
-        look.kind = match (look.open.as_slice(), tops.as_slice(), floors.as_slice()) {
-            ([], _, _) => Kind::Whole(length),
-            (&[form], &[_], &[_]) if positive => Kind::Cut(Cut {
-                form,
-                below: Some(length),
-                above: None,
-            }),
-            (&[form], &[_], &[_]) if sides == 0 => Kind::Cut(Cut {
-                form,
-                below: None,
-                above: Some(length),
-            }),
-            (&[_], &[a, b], &[floor]) => Kind::Cut(Cut {
-                form: minus(&b, &a),
-                below: Some(minus(&b, &floor)),
-                above: Some(minus(&a, &floor)),
-            }),
-            (&[_], &[top], &[a, b]) => Kind::Cut(Cut {
-                form: minus(&b, &a),
-                below: Some(minus(&top, &a)),
-                above: Some(minus(&top, &b)),
-            }),
-            _ => Kind::Several,
+        look.kind = if look.open.is_empty() {
+            Kind::Whole(minus(&tops[0], &floors[0]))
+        } else {
+            Kind::Open
         };
+        (look.tops, look.floors) = (tops, floors);
         look
     }
 }
 
 /// The forms, times `sign`, that may be the lowest somewhere on a patch.
-fn lowest(
-    forms: &[Form],
-    hull: &Hull,
-    slack: f64,
-    sign: f64,
-    misjudged: &mut f64,
-) -> SmallVec<[Form; 4]> {
-    let mut left: SmallVec<[Form; 4]> = SmallVec::new();
+fn lowest(forms: &[Form], hull: &Hull, slack: f64, sign: f64, misjudged: &mut f64) -> Forms {
+    let mut left = Forms::new();
     for form in forms {
         let above = |other: &Form, by: &Form| {
             let d = minus(other, by).map(|c| c * sign);

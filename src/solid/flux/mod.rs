@@ -11,8 +11,9 @@
 //! of crossings. Surface in a side of the cell has n_x = 0 there, surface in the others meets a continuous L.
 //!
 //! Patches are halved. Where no plane cuts one the integrand is analytic and Gauss's rule is taken, with the bound of
-//! [`proof`]; where one plane does, along a curve that is proved to be a graph over a parameter, so again on
-//! both sides of the graph. What is left, where planes meet or touch the surface, counts with all it can hold:
+//! [`proof`]; where planes do, along curves that are proved to be graphs over a parameter and not to cross, so again in
+//! each strip between them: patches are cut where curves cross or leave them. What is left, where planes touch the surface,
+//! counts with all it can hold:
 //!
 //! ```text
 //!   |∬_patch L n_x dA| <= max L · min(|patch|_uv max |y_u z_v - y_v z_u|, 2pq |box in (y, z)|)
@@ -28,20 +29,22 @@ mod domain;
 mod net;
 mod place;
 mod proof;
+mod strips;
 
 pub(super) use net::Net;
 pub(super) use place::Place;
 
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::HalfSpace;
-use domain::{Cut, Domain, Form, Hull, Kind, Look};
+use domain::{Domain, Form, Hull, Kind, Look};
 use glam::DVec3;
 use net::real;
-use proof::{Graph, Norms, POINTS};
+use proof::{Norms, POINTS};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::LazyLock;
+use strips::{Attempt, Strips};
 
 /// Steps of refinement for one direction.
 const BUDGET: usize = 20_000;
@@ -59,21 +62,21 @@ static RULES: LazyLock<[Vec<(f64, f64)>; POINTS.len()]> = LazyLock::new(|| {
 });
 
 /// What is summed over a patch.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 enum Sum {
     Nothing,
     /// L linear, by a rule of [`RULES`].
     Whole(Form, usize),
-    /// On both sides of a zero v = g(u).
-    Cut(Cut, usize),
+    /// L linear in each of the strips.
+    Strips(Box<Strips>, usize),
 }
 
 impl Sum {
     /// Whether there is a rule of more points.
-    fn is_coarse(self) -> bool {
+    fn is_coarse(&self) -> bool {
         match self {
             Self::Nothing => false,
-            Self::Whole(_, rule) | Self::Cut(_, rule) => rule + 1 < POINTS.len(),
+            Self::Whole(_, rule) | Self::Strips(_, rule) => rule + 1 < POINTS.len(),
         }
     }
 }
@@ -316,48 +319,31 @@ impl Cell {
                 }
                 leaf(net, best.0, best.1, slack, (wide, 0.5))
             }
-            Kind::Several => {
-                let cut = (apart(&look, &hull, net.degrees), 0.5);
-                leaf(net, best.0, best.1, slack, cut)
-            }
-            Kind::Cut(cut) => {
-                let Some((turned, graph)) = graph(&net, &cut.form) else {
-                    let at = wider(bends_of(&cut.form, &net), &hull, net.degrees);
-                    return leaf(net, best.0, best.1, slack, (at, 0.5));
-                };
-                // The same patch with the parameter first that the zero is a graph over.
-                let net = if turned { net.transposed() } else { net };
-                let room = net.slack * 4.0 * net.points.iter().fold(0.0_f64, |m, h| m.max(h[3]));
-                if let Some(at) = graph.exit(room) {
-                    return leaf(net, best.0, best.1, slack, (0, at));
+            Kind::Open => match strips::attempt(&net, &look) {
+                Attempt::None => {
+                    let at = match look.open.as_slice() {
+                        [form] => wider(bends_of(form, &net), &hull, net.degrees),
+                        _ => apart(&look, &hull, net.degrees),
+                    };
+                    leaf(net, best.0, best.1, slack, (at, 0.5))
                 }
-                let hull = domain::hull(&net);
-                let norms = Norms::new(&net, &hull);
-                let bounds = norms.cut(&graph, &[cut.below, cut.above]);
-                let (rule, error) = proof::rule(&bounds, fine);
-                if error < best.1 {
-                    best = (Sum::Cut(*cut, rule), error);
+                Attempt::Cut(net, at) => leaf(net, best.0, best.1, slack, (0, at)),
+                Attempt::Strips(net, graphs, strips) => {
+                    let hull = domain::hull(&net);
+                    let norms = Norms::new(&net, &hull);
+                    let bounds = norms.strips(&graphs, &strips.regions);
+                    let (rule, error) = proof::rule(&bounds, fine);
+                    // The zeros themselves are found to a rounding.
+                    #[allow(clippy::cast_precision_loss, reason = "a few")]
+                    let found = 4.0 * graphs.len() as f64 * sheets * net.slack;
+                    if error < best.1 {
+                        best = (Sum::Strips(Box::new(strips), rule), error);
+                    }
+                    let wide = wider(norms.bends(&net), &hull, net.degrees);
+                    leaf(net, best.0, best.1, slack + found, (wide, 0.5))
                 }
-                let wide = wider(norms.bends(&net), &hull, net.degrees);
-                // The zero itself is found to a rounding.
-                let slack = slack + 2.0 * sheets * net.slack;
-                leaf(net, best.0, best.1, slack, (wide, 0.5))
-            }
+            },
         }
-    }
-}
-
-/// The zero of a form as a graph, and whether it is one over the second parameter.
-fn graph(net: &Net, form: &Form) -> Option<(bool, Graph)> {
-    let over_first = Graph::new(net, form).filter(Graph::is_proved);
-    if over_first.as_ref().is_some_and(|g| g.overshoot() == 0.0) {
-        return over_first.map(|g| (false, g));
-    }
-    let over_second = Graph::new(&net.transposed(), form).filter(Graph::is_proved);
-    match (over_first, over_second) {
-        (Some(a), Some(b)) if b.overshoot() < a.overshoot() => Some((true, b)),
-        (Some(a), _) => Some((false, a)),
-        (None, b) => b.map(|b| (true, b)),
     }
 }
 
@@ -420,20 +406,12 @@ impl Leaf {
                 });
                 columns.sum()
             }
-            Sum::Cut(cut, rule) => {
+            Sum::Strips(strips, rule) => {
                 let rule = &RULES[*rule];
                 let columns = rule.iter().map(|&(u, weight)| {
                     let line = self.net.line(u);
-                    let (zero, rising) = line.zero(&cut.form);
-                    let (first, last) = if rising {
-                        (cut.below, cut.above)
-                    } else {
-                        (cut.above, cut.below)
-                    };
-                    let part = |form: Option<Form>, from: f64, to: f64| {
-                        form.map_or(0.0, |form| along(&line, &form, rule, from, to))
-                    };
-                    weight * (part(first, 0.0, zero) + part(last, zero, 1.0))
+                    let part = |form: &Form, from, to| along(&line, form, rule, from, to);
+                    weight * strips.sum(&line, part)
                 });
                 columns.sum()
             }

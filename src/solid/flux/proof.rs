@@ -171,19 +171,19 @@ impl Norms {
         })
     }
 
-    /// Bounds on both sides of a graph together.
-    pub(super) fn cut(&self, graph: &Graph, sides: &[Option<Form>; 2]) -> Bounds {
+    /// Bounds over all strips between graphs together, with L on each of them.
+    pub(super) fn strips(&self, graphs: &[Graph], regions: &[Option<Form>]) -> Bounds {
         RHO.map(|rho| {
             let sigma = sigma(rho);
-            let Some(tau) = graph.reach(sigma) else {
+            let tau = graphs
+                .iter()
+                .try_fold(sigma, |m, g| Some(g.reach(sigma)?.max(m)));
+            let Some((tau, reach)) = tau.and_then(|tau| Some((tau, self.at(sigma, tau)?))) else {
                 return f64::INFINITY;
             };
-            let Some(reach) = self.at(sigma, tau) else {
-                return f64::INFINITY;
-            };
-            let forms = sides.iter().flatten().map(|form| self.form(form, &reach));
-            // |g| and |1 - g| are at most (τ + 1) / 2.
-            reach.jacobian * forms.sum::<f64>() * 0.5 * (tau + 1.0)
+            let forms = regions.iter().flatten().map(|form| self.form(form, &reach));
+            // No strip is wider than the ellipse.
+            reach.jacobian * forms.sum::<f64>() * tau
         })
     }
 
@@ -250,8 +250,10 @@ pub(super) struct Graph {
     /// Where the line is at u = 0 and at u = 1.
     ends: [f64; 2],
     rise: f64,
+    /// B, and the largest of D, D_u and D_v.
+    along: f64,
     deviation: f64,
-    deviation_slope: f64,
+    slopes: [f64; 2],
 }
 
 impl Graph {
@@ -279,14 +281,18 @@ impl Graph {
         let f = &coefficients;
         let linear = |i: usize, j: usize| b * real(i) / real(p) + c * real(j) / real(q);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut slope = 0.0_f64;
+        let mut slopes = [0.0_f64; 2];
         for j in 0..=q {
             for i in 0..=p {
                 let rest = f[at(i, j)] - linear(i, j);
                 (low, high) = (low.min(rest), high.max(rest));
                 if j < q {
                     let step = real(q) * (f[at(i, j + 1)] - f[at(i, j)]) - c;
-                    slope = slope.max(step.abs());
+                    slopes[1] = slopes[1].max(step.abs());
+                }
+                if i < p {
+                    let step = real(p) * (f[at(i + 1, j)] - f[at(i, j)]) - b;
+                    slopes[0] = slopes[0].max(step.abs());
                 }
             }
         }
@@ -296,7 +302,8 @@ impl Graph {
             ends: [-a / c, -(a + b) / c],
             rise: c,
             deviation: 0.5 * (high - low),
-            deviation_slope: slope,
+            along: b,
+            slopes,
             coefficients,
         })
     }
@@ -318,10 +325,45 @@ impl Graph {
         [1.02, 1.1, 1.3, 1.7].into_iter().find_map(|room| {
             let tau = least * room;
             let across = sigma.powi(p);
-            let slope = self.deviation_slope * across * tau.powi(q - 1) / self.rise;
+            let slope = self.slopes[1] * across * tau.powi(q - 1) / self.rise;
             let radius = self.deviation * across * tau.powi(q) / (self.rise * (1.0 - slope));
             (slope < 0.9 && line + 2.0 * radius <= tau).then_some(tau)
         })
+    }
+
+    /// The range of the graph's slope.
+    fn slope(&self) -> [f64; 2] {
+        let [du, dv] = self.slopes;
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for along in [self.along - du, self.along + du] {
+            for rise in [self.rise - dv, self.rise + dv] {
+                let slope = -along / rise;
+                range = [range[0].min(slope), range[1].max(slope)];
+            }
+        }
+        range
+    }
+
+    /// How far the zero may be from the line over the patch.
+    fn off_line(&self) -> f64 {
+        self.deviation / (self.rise - self.slopes[1])
+    }
+
+    /// Whether this graph and another, that do not change sides between the ends of the patch, do not between
+    /// them either.
+    pub(super) fn is_apart(&self, other: &Self) -> bool {
+        let ([a, b], [c, d]) = (self.slope(), other.slope());
+        if b < c || d < a {
+            return true;
+        }
+        let gaps = [0, 1].map(|k| self.ends[k] - other.ends[k]);
+        let room = self.off_line() + other.off_line();
+        gaps.iter().all(|g| *g > room) || gaps.iter().all(|g| *g < -room)
+    }
+
+    /// How far along v the zero may be off where the patch is off by `slack`.
+    pub(super) fn room(&self, slack: f64) -> f64 {
+        slack / self.rise
     }
 
     /// Whether the zero is a graph over the patch, if it does not leave it.
