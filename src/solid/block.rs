@@ -11,8 +11,7 @@
 use super::measure::Moments;
 use super::path::{Path, Stretch};
 use super::row::{Cuts, Row};
-use super::rule::{Area, Normal, Patch, Rule};
-use super::seeds::Seeds;
+use super::rule::{Area, Cover, Normal, Patch, Rule};
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::{HalfSpace, box_volume_within};
 use crate::math::{Aabb, Dd, Real, Side, Similarity};
@@ -170,13 +169,9 @@ impl Block {
     }
 
     /// The six faces: the lines of number 2 i and 2 i + 1 are on the sides -h_i and h_i.
-    pub(super) fn patches(&self, seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
-        let faces = (0..6).map(|number| {
-            let across = (number / 2 + 1) % 3;
-            let place = |v: f64| 0.5 * (v / self.half[across] + 1.0);
-            (Patch::face(number), seeds.along(across, place))
-        });
-        faces.collect()
+    #[allow(clippy::unused_self, reason = "what every body answers")]
+    pub(super) fn patches(&self) -> Vec<Patch> {
+        (0..6).map(Patch::face).collect()
     }
 
     pub(super) fn pace(&self, patch: Patch, _t: f64) -> f64 {
@@ -204,6 +199,41 @@ impl Block {
             normal: Normal::Fixed(out * area),
             area: Area::Even(area),
         })
+    }
+
+    /// Distance of a point from the plane of a face, in scene units.
+    pub(super) fn off_plane(&self, face: usize, point: DVec3) -> f64 {
+        let (axis, sign) = (face / 2, [-1.0, 1.0][face % 2]);
+        let p = self.frame.to_local(point).point;
+        (p[axis] - sign * self.half[axis]).abs() * self.frame.scale()
+    }
+
+    /// Distance of a point from the nearest of the faces that are `kept`, in scene units; infinite where none is.
+    pub(super) fn distance_to_faces(&self, kept: &[bool; 6], point: DVec3) -> f64 {
+        let p = self.frame.to_local(point).point;
+        let faces = (0..6).filter(|&i| kept[i]).map(|i| {
+            let (axis, sign) = (i / 2, [-1.0, 1.0][i % 2]);
+            let mut beyond = (p.abs() - self.half).max(DVec3::ZERO);
+            beyond[axis] = p[axis] - sign * self.half[axis];
+            length(beyond)
+        });
+        faces.fold(f64::INFINITY, f64::min) * self.frame.scale()
+    }
+
+    /// A ball around the part of a face between two parameters and two shares of its lines.
+    pub(super) fn cover(&self, patch: Patch, t: [f64; 2], s: [f64; 2]) -> Cover {
+        let (i, sign) = (patch.number / 2, [-1.0, 1.0][patch.number % 2]);
+        let (across, along) = ((i + 1) % 3, (i + 2) % 3);
+        let scale = self.frame.scale();
+        let mut centre = DVec3::ZERO;
+        centre[i] = sign * self.half[i];
+        centre[across] = (t[0] + t[1] - 1.0) * self.half[across];
+        centre[along] = (s[0] + s[1] - 1.0) * self.half[along];
+        Cover {
+            centre: self.frame.to_world(centre),
+            across: (t[1] - t[0]) * self.half[across] * scale,
+            along: (s[1] - s[0]) * self.half[along] * scale,
+        }
     }
 
     /// Whether the surface may come within `margin` (scene units) of a stretch of a path.

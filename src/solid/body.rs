@@ -17,8 +17,7 @@ use super::patches::Patches;
 use super::path::Stretch;
 use super::revolved::Revolved;
 use super::row::{Cuts, LayerCuts, Row};
-use super::rule::{Patch, Rule};
-use super::seeds::Seeds;
+use super::rule::{Cover, Patch, Rule};
 use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::HalfSpace;
@@ -216,9 +215,14 @@ impl Body {
         }
     }
 
-    /// The patches of the surface with the parameters at which each is cut, 0 and 1 included.
-    pub(super) fn patches(&self, seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
-        family!(self, b => b.patches(seeds))
+    /// The patches of the surface.
+    pub(super) fn patches(&self) -> Vec<Patch> {
+        family!(self, b => b.patches())
+    }
+
+    /// A ball around the part of a patch between two parameters and two shares of its lines' ranges.
+    pub(super) fn cover(&self, patch: Patch, t: [f64; 2], s: [f64; 2]) -> Cover {
+        family!(self, b => b.cover(patch, t, s))
     }
 
     /// The line of a patch at parameter `t`, with what beside it is `hair` away (scene units);

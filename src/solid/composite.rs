@@ -13,63 +13,59 @@
 
 use super::assembly::Assembly;
 use super::body::Body;
-use super::faces::{Faces, QUANTITIES, Sheet, direction};
+use super::faces::{Faces, QUANTITIES, direction};
 use super::measure::{Measures, Moments};
+use super::panels::{AREA, FIRST, PRODUCTS, Panel, SQUARES, VOLUME, integrated};
 use super::terms::Term;
 use crate::math::Aabb;
-use crate::math::quadrature::{Integral, panel_of};
+use crate::math::quadrature::Integral;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Estimated errors to reach, relative to area, volume, volume times size and its square.
-const TOLERANCE: f64 = 1e-12;
 /// How far the surface of a turned region may be from that of the volumes it stands for, in ε times the furthest
 /// coordinate: a control point may be 8 ε (size + |P|) from where it is taken for.
 const STAND_IN: f64 = 64.0;
-/// Panels to begin with, times the bodies that each may cross: more are not begun.
-const MOST_BEGUN: usize = 300_000;
-/// Stretches of circles looked at, those against curves counted several times, after which the estimates are taken as
-/// they are: some seconds' work.
-const MOST_WORK: u64 = 4_000_000;
-/// Panels halved between two looks at the work.
-const BATCH: usize = 64;
+/// Questions to solids, after which estimates are taken as they are, or the composite is not measured: half a
+/// minute's work.
+const MOST_WORK: u64 = 40_000_000;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
-/// Places of the quantities.
-const AREA: usize = 0;
-const VOLUME: usize = 1;
-const FIRST: usize = 2;
-const SQUARES: usize = 5;
-const PRODUCTS: usize = 8;
-const EDGES: usize = 11;
 
 impl Assembly {
-    /// Volume, area and moments of the whole solid; `None` where so many bodies meet that their
-    /// faces would take minutes.
+    /// Volume, area and moments of the whole solid; `None` where its surfaces meet so often, or so nearly, that
+    /// their faces would take minutes.
     #[must_use]
     pub fn moments(&self) -> Option<Moments> {
-        Some(self.measured(false)?.0)
+        self.moments_within(MOST_WORK)
+    }
+
+    /// The same within an amount of work, counted in questions to solids: some million take a second. Equal
+    /// composites have equal answers whatever the machine and its threads; `None` where the work does not suffice.
+    #[must_use]
+    pub fn moments_within(&self, work: u64) -> Option<Moments> {
+        Some(self.measured(work, false)?.0)
     }
 
     /// What a user reads of [`moments`](Self::moments), with the bounds.
     #[must_use]
     pub fn measures(&self) -> Option<Measures> {
-        let (moments, bounds) = self.measured(true)?;
+        let (moments, bounds) = self.measured(MOST_WORK, true)?;
         Some(moments.measures(bounds))
     }
 
     /// Moments and, where they are asked for, bounds.
-    fn measured(&self, with_bounds: bool) -> Option<(Moments, Option<Aabb>)> {
+    fn measured(&self, work: u64, with_bounds: bool) -> Option<(Moments, Option<Aabb>)> {
         let mut moments = Vec::new();
         let mut bounds: Option<Aabb> = None;
+        let mut left = work;
         for cluster in self.clusters() {
             let (one, extent) = match cluster.as_slice() {
                 [Term { factors }] if factors.len() == 1 && !factors[0].complement => {
                     let body = &self.bodies()[factors[0].body];
                     (body.moments(), Some(body.bounds()))
                 }
-                terms => over_faces(self.bodies(), terms, with_bounds)?,
+                terms => over_faces(self.bodies(), terms, &mut left, with_bounds)?,
             };
             moments.push(one);
             bounds = match (bounds, extent) {
@@ -80,23 +76,22 @@ impl Assembly {
         Some((Moments::sum(&moments), bounds))
     }
 
-    /// The terms in groups whose boxes keep apart.
+    /// The terms in groups that keep apart: from one to another of a group through boxes that touch.
     fn clusters(&self) -> Vec<Vec<Term>> {
-        let mut clusters: Vec<(Aabb, Vec<Term>)> = Vec::new();
+        let mut clusters: Vec<Vec<(Aabb, &Term)>> = Vec::new();
         for term in self.terms() {
             let Some(own) = extent(self.bodies(), term) else {
                 continue;
             };
-            let mut joined = (own, vec![term.clone()]);
-            // A larger box may reach clusters that the term's own did not.
-            while let Some(k) = clusters.iter().position(|c| touch(&c.0, &joined.0)) {
-                let (b, terms) = clusters.swap_remove(k);
-                joined.0 = joined.0.union(&b);
-                joined.1.extend(terms);
+            let mut joined = vec![(own, term)];
+            while let Some(k) = (clusters.iter()).position(|c| c.iter().any(|t| touch(&t.0, &own)))
+            {
+                joined.extend(clusters.swap_remove(k));
             }
             clusters.push(joined);
         }
-        clusters.into_iter().map(|c| c.1).collect()
+        let terms = |c: Vec<(Aabb, &Term)>| c.into_iter().map(|t| t.1.clone()).collect();
+        clusters.into_iter().map(terms).collect()
     }
 }
 
@@ -116,74 +111,11 @@ fn touch(a: &Aabb, b: &Aabb) -> bool {
     (a.min - margin).cmple(b.max).all() && (b.min - margin).cmple(a.max).all()
 }
 
-/// A stretch of a sheet with its integrals.
-struct Panel {
-    sheet: Sheet,
-    range: [f64; 2],
-    integrals: [Integral; QUANTITIES],
-    /// For each direction the furthest circle looked at: how far it reaches, and its parameter.
-    furthest: [(f64, f64); 6],
-}
-
-impl Panel {
-    fn new(faces: &Faces, sheet: Sheet, range: [f64; 2]) -> Self {
-        let mut furthest = [(f64::NEG_INFINITY, range[0]); 6];
-        let mut flux = |t| {
-            let (flux, extremes) = faces.flux_and_extremes(sheet, t);
-            for (best, reach) in furthest.iter_mut().zip(extremes) {
-                if reach > best.0 {
-                    *best = (reach, t);
-                }
-            }
-            flux
-        };
-        let integrals = panel_of(&mut flux, range[0], range[1]);
-        Self {
-            sheet,
-            range,
-            integrals,
-            furthest,
-        }
-    }
-
-    /// Whether the other goes on where this one ends.
-    fn is_followed_by(&self, other: &Self) -> bool {
-        #[allow(clippy::float_cmp, reason = "halving keeps the ends")]
-        let meets = self.range[1] == other.range[0];
-        meets && self.sheet.number() == other.sheet.number()
-    }
-
-    fn halves(&self) -> [(Sheet, [f64; 2]); 2] {
-        let [a, b] = self.range;
-        let m = 0.5 * (a + b);
-        [(self.sheet, [a, m]), (self.sheet, [m, b])]
-    }
-
-    /// The error of quantity `k` that is not the panel's: the hair moves the edges by as much, a few
-    /// times that where faces meet at a slant, and what it moves is at most as far from the centre
-    /// as a body; and the rounding of the sum.
-    fn noise(&self, k: usize, faces: &Faces) -> f64 {
-        let power = match k {
-            AREA => 0,
-            VOLUME => 1,
-            FIRST..SQUARES => 2,
-            _ => 3,
-        };
-        let moved = 4.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
-        moved + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
-    }
-
-    /// The largest error as a multiple of its tolerance.
-    fn excess(&self, tolerances: &[f64; QUANTITIES]) -> f64 {
-        let errors = self.integrals.iter().zip(tolerances);
-        errors.fold(0.0, |m, (i, t)| m.max(i.error / t))
-    }
-}
-
 /// Moments and bounds of terms by integrals over their faces.
 fn over_faces(
     bodies: &[Arc<Body>],
     terms: &[Term],
+    work: &mut u64,
     with_bounds: bool,
 ) -> Option<(Moments, Option<Aabb>)> {
     let boxes = terms.iter().filter_map(|t| extent(bodies, t));
@@ -199,12 +131,8 @@ fn over_faces(
         m.max(b.min.abs().max(b.max.abs()).max_element())
     });
     let faces = Faces::new(bodies, terms, reach);
-    let most = if stand_ins { 5 * MOST_WORK } else { MOST_WORK };
-    let mut panels = integrated(&faces, size, most)?;
-    panels.sort_by(|a, b| {
-        let key = |p: &Panel| p.sheet.number();
-        key(a).cmp(&key(b)).then(a.range[0].total_cmp(&b.range[0]))
-    });
+    let panels = integrated(&faces, size, *work)?;
+    *work = work.saturating_sub(faces.work());
     let mut moments = moments(&totals(&panels, &faces), centre);
     if stand_ins {
         moments.widen(STAND_IN * f64::EPSILON, reach + centre.length());
@@ -233,82 +161,6 @@ fn about(bodies: &[Arc<Body>], terms: &[Term], centre: DVec3) -> (Vec<Arc<Body>>
         });
     }
     (moved, renumbered)
-}
-
-/// Panels whose estimated errors sum to the tolerances, or the best that `most` stretches give; `None` where
-/// even the first are too many.
-fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Panel>> {
-    let mut panels = made(faces, faces.sheets(MOST_BEGUN)?, 2 * most)?;
-    loop {
-        let chosen = worst(&panels, faces, &tolerances(&panels, size));
-        let mut halved = Vec::new();
-        for batch in chosen.chunks(BATCH) {
-            let halves = batch.iter().flat_map(|&i| panels[i].halves()).collect();
-            let Some(halves) = made(faces, halves, most) else {
-                break;
-            };
-            halved.extend_from_slice(batch);
-            panels.extend(halves);
-        }
-        halved.sort_unstable();
-        for &i in halved.iter().rev() {
-            panels.swap_remove(i);
-        }
-        if halved.len() < chosen.len() || chosen.is_empty() {
-            return Some(panels);
-        }
-    }
-}
-
-/// The panels of all stretches; `None` where the work passes `most`, or has passed it, whatever the order of the work.
-/// Where surfaces nearly coincide each circle takes thousands of stretches.
-fn made(faces: &Faces, work: Vec<(Sheet, [f64; 2])>, most: u64) -> Option<Vec<Panel>> {
-    work.into_par_iter()
-        .map(|(sheet, range)| {
-            let panel = (faces.work() <= most).then(|| Panel::new(faces, sheet, range));
-            panel.filter(|_| faces.work() <= most)
-        })
-        .collect()
-}
-
-/// The panels to be halved for the rest to be good: of those with the largest errors the ones that halving mends, the
-/// largest first.
-fn worst(panels: &[Panel], faces: &Faces, tolerances: &[f64; QUANTITIES]) -> Vec<usize> {
-    let excess = |(i, p): (usize, &Panel)| (p.excess(tolerances), i);
-    let mut order: Vec<(f64, usize)> = panels.iter().enumerate().map(excess).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let mut left: f64 = order.iter().map(|o| o.0).sum();
-    let taken = order.iter().take_while(|(excess, _)| {
-        let more = left > 0.5;
-        left -= excess;
-        more
-    });
-    let divides = |p: &Panel| {
-        let [a, b] = p.range;
-        let m = 0.5 * (a + b);
-        m > a && m < b
-    };
-    // Halving does not mend rounding.
-    let noisy = |p: &Panel| {
-        let least = |k: usize| p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0);
-        (AREA..EDGES).all(|k| p.integrals[k].error <= least(k))
-    };
-    let mends = |i: &usize| divides(&panels[*i]) && !noisy(&panels[*i]);
-    taken.map(|o| o.1).filter(mends).collect()
-}
-
-/// Errors that are good enough.
-fn tolerances(panels: &[Panel], size: f64) -> [f64; QUANTITIES] {
-    let sum = |k: usize| panels.iter().map(|p| p.integrals[k].value).sum::<f64>();
-    let area = sum(AREA).abs().max(f64::MIN_POSITIVE);
-    // Below this the volume is rounding.
-    let volume = sum(VOLUME).abs().max(1e-12 * area * size);
-    let mut tolerances = [f64::INFINITY; QUANTITIES];
-    tolerances[AREA] = TOLERANCE * area;
-    tolerances[VOLUME] = TOLERANCE * volume;
-    tolerances[FIRST..SQUARES].fill(TOLERANCE * volume * size);
-    tolerances[SQUARES..EDGES].fill(TOLERANCE * volume * size * size);
-    tolerances
 }
 
 /// The sums with their errors.
@@ -382,21 +234,22 @@ fn extremes(faces: &Faces, panels: &[Panel], centre: DVec3, size: f64) -> Option
 fn highest_about(faces: &Faces, panels: &[Panel], i: usize, k: usize) -> f64 {
     let panel = &panels[i];
     let (value, at) = panel.furthest[k];
+    let sheet = panel.sheet();
     if value == f64::NEG_INFINITY {
         return value;
     }
     let before = panels[..i].last().filter(|p| p.is_followed_by(panel));
     let after = panels.get(i + 1).filter(|p| panel.is_followed_by(p));
-    let low = before.unwrap_or(panel).range[0];
-    let high = after.unwrap_or(panel).range[1];
-    let down = highest(faces, panel.sheet, [at, low], k);
-    let up = highest(faces, panel.sheet, [at, high], k);
+    let low = before.unwrap_or(panel).range()[0];
+    let high = after.unwrap_or(panel).range()[1];
+    let down = highest(faces, sheet, [at, low], k);
+    let up = highest(faces, sheet, [at, high], k);
     value.max(down).max(up)
 }
 
 /// The largest extreme along direction `k` of the circles from a visible one to another parameter,
 /// as far as they are visible: golden section.
-fn highest(faces: &Faces, sheet: Sheet, [from, to]: [f64; 2], k: usize) -> f64 {
+fn highest(faces: &Faces, sheet: usize, [from, to]: [f64; 2], k: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     // In parameters from 0, where the circle is visible, to 1.
     let value = |x: f64| faces.extremes(sheet, from + (to - from) * x)[k];

@@ -23,8 +23,7 @@ use super::measure::Moments;
 use super::path::Path;
 use super::revolved::Revolved;
 use super::row::{Cuts, Row};
-use super::rule::{Area, Normal, Patch, Rule};
-use super::seeds::Seeds;
+use super::rule::{Area, Cover, Normal, Patch, Rule};
 use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::similarity::LocalPoint;
@@ -208,13 +207,36 @@ impl Ellipsoid {
     }
 
     /// One patch: ellipses of latitude, from the south pole at 0 to the north pole at 1.
-    pub(super) fn patches(&self, seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
-        let place = |z: f64| (z / self.radii.z).clamp(-1.0, 1.0).asin() / PI + 0.5;
-        let mut cuts = seeds.along(2, place);
-        cuts.extend([0.25, 0.5, 0.75]);
-        cuts.sort_by(f64::total_cmp);
-        cuts.dedup_by(|a, b| (*a - *b).abs() <= 1e-14);
-        vec![(Patch::face(0), cuts)]
+    #[allow(clippy::unused_self, reason = "what every body answers")]
+    pub(super) fn patches(&self) -> Vec<Patch> {
+        vec![Patch::face(0)]
+    }
+
+    /// Distance of a point from the surface to first order, in scene units.
+    pub(super) fn off_surface(&self, point: DVec3) -> f64 {
+        let p = self.frame.to_local(point).point / self.radii;
+        let slope = length(p / self.radii);
+        if slope > 0.0 {
+            0.5 * (p.length_squared() - 1.0).abs() / slope * self.frame.scale()
+        } else {
+            self.radii.min_element() * self.frame.scale()
+        }
+    }
+
+    /// A ball around the part between two parameters and two shares of the ellipses.
+    pub(super) fn cover(&self, _patch: Patch, t: [f64; 2], s: [f64; 2]) -> Cover {
+        let middle = |[a, b]: [f64; 2]| 0.5 * (a + b);
+        let (sin, cos) = ((middle(t) - 0.5) * PI).sin_cos();
+        let (across, along) = (TAU * middle(s)).sin_cos();
+        let unit = DVec3::new(cos * along, cos * across, sin);
+        let most = self.radii.max_element() * self.frame.scale();
+        let half = 0.5 * PI * (t[1] - t[0]);
+        Cover {
+            centre: self.frame.to_world(unit * self.radii),
+            across: most * half,
+            // Nowhere is a circle of latitude longer than that.
+            along: most * (cos.abs() + half).min(1.0) * 0.5 * TAU * (s[1] - s[0]),
+        }
     }
 
     pub(super) fn pace(&self, _patch: Patch, _t: f64) -> f64 {

@@ -3,16 +3,19 @@
 //!
 //! A point of a body's surface is on the composite's boundary where the composite holds one of the
 //! two points a hair beside it and not the other. Along a circle of the surface that can only
-//! change where the circle, moved by the hair, crosses another body. Where faces of several bodies
-//! coincide, the first body's counts.
+//! change where the circle crosses another body, which the patch's [`Atlas`] narrows down. Where faces
+//! coincide, the circles a hair beside are what crosses the faces that are left, see [`Remains`], and
+//! the first body's faces count.
 
+use super::atlas::{Atlas, Rival};
 use super::body::Body;
 use super::path::Path;
+use super::remains::Remains;
 use super::rule::{Patch, Rule};
-use super::seeds::Seeds;
 use super::terms::Term;
 use crate::math::{Aabb, Side};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -24,6 +27,9 @@ pub(super) const QUANTITIES: usize = 12;
 /// Values of the quantities, in the order of [`QUANTITIES`].
 pub(super) type Flux = [f64; QUANTITIES];
 
+/// How near ends of stretches count as one for the [`Seen::signature`], as a share of the line.
+const NARROW: f64 = 1e-10;
+
 /// Bodies and terms about a common centre.
 #[derive(Debug)]
 pub(super) struct Faces {
@@ -31,6 +37,7 @@ pub(super) struct Faces {
     pub(super) terms: Vec<Term>,
     /// For each body those whose boxes touch its own.
     others: Vec<Vec<usize>>,
+    sheets: Vec<Sheet>,
     /// The furthest coordinate of a body.
     reach: f64,
     /// How far beside a surface its two sides are asked.
@@ -41,59 +48,85 @@ pub(super) struct Faces {
 }
 
 /// One patch of one body's surface.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sheet {
+#[derive(Debug)]
+struct Sheet {
     body: usize,
     patch: Patch,
+    /// What it may cross of other bodies, in their order.
+    remains: Vec<(usize, Remains)>,
+    atlas: Atlas,
 }
 
-impl Sheet {
-    /// A number for an order.
-    pub(super) fn number(self) -> (usize, Patch) {
-        (self.body, self.patch)
-    }
+/// What is known of a line of a sheet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Seen {
+    /// How often it crosses other bodies.
+    crossings: usize,
+    /// A number that stands for the order of its visible stretches and of the bodies that end them: while
+    /// it stays the same, the ends move smoothly with the line, but where they pass an edge of a body.
+    pub(super) signature: u64,
 }
 
 impl Faces {
     /// The faces of the terms over `bodies`, whose coordinates reach to `reach`.
     pub(super) fn new(bodies: Vec<Arc<Body>>, terms: Vec<Term>, reach: f64) -> Self {
         let boxes: Vec<Aabb> = bodies.iter().map(|b| b.bounds()).collect();
-        let others = (0..boxes.len())
-            .map(|i| {
-                let near = (0..boxes.len()).filter(|&j| j != i && touch(&boxes[i], &boxes[j]));
-                near.collect()
-            })
+        let hair = 64.0 * f64::EPSILON * reach;
+        let near = |i: usize, j: usize| touch(&boxes[i], &grown(&boxes[j], 4.0 * hair));
+        let others: Vec<Vec<usize>> = (0..boxes.len())
+            .map(|i| (0..boxes.len()).filter(|&j| j != i && near(i, j)).collect())
             .collect();
-        let prices = bodies.iter().map(|b| b.price());
+        let prices: Vec<u64> = bodies.iter().map(|b| b.price()).collect();
+        let patches: Vec<(usize, Patch)> = (bodies.iter().enumerate())
+            .flat_map(|(i, b)| b.patches().into_iter().map(move |p| (i, p)))
+            .collect();
+        let sheets = patches.into_par_iter().map(|(body, patch)| {
+            // What a body sweeps meets no face of its own; its flat caps do.
+            let own = patch.cap.map(|_| &body);
+            let met = others[body].iter().chain(own).map(|&k| {
+                let remains =
+                    Remains::new(&bodies[body], patch, &bodies[k], k == body, 0.25 * hair);
+                (k, remains)
+            });
+            let remains: Vec<(usize, Remains)> = met.collect();
+            let rivals: Vec<Rival> = (remains.iter())
+                .map(|(k, remains)| Rival {
+                    number: *k,
+                    body: &bodies[*k],
+                    remains,
+                    price: prices[*k],
+                })
+                .collect();
+            let atlas = Atlas::new(&bodies[body], patch, &rivals, 4.0 * hair);
+            Sheet {
+                body,
+                patch,
+                remains,
+                atlas,
+            }
+        });
+        let sheets: Vec<Sheet> = sheets.collect();
+        let work = sheets.iter().map(|s| s.atlas.work).sum();
         Self {
-            prices: prices.collect(),
+            prices,
             bodies,
             terms,
             others,
+            sheets,
             reach,
-            hair: 64.0 * f64::EPSILON * reach,
-            work: AtomicU64::new(0),
+            hair,
+            work: AtomicU64::new(work),
         }
     }
 
-    /// All sheets of all bodies, cut where the estimates need it; `None` where they cost more than
-    /// `most` lines to cross.
-    pub(super) fn sheets(&self, most: usize) -> Option<Vec<(Sheet, [f64; 2])>> {
-        let mut sheets = Vec::new();
-        let mut left = most;
-        for (body, b) in self.bodies.iter().enumerate() {
-            let others = self.others[body].iter().map(|&k| &*self.bodies[k]);
-            // A cap is cut by the heights of its own edges too.
-            let own = b.has_caps().then_some(&**b);
-            let seeds = Seeds::new(b, others.chain(own));
-            for (patch, cuts) in b.patches(&seeds) {
-                let sheet = Sheet { body, patch };
-                let cost = 1 + self.others[body].len();
-                left = left.checked_sub(cost * (cuts.len() - 1))?;
-                sheets.extend(cuts.windows(2).map(|w| (sheet, [w[0], w[1]])));
-            }
-        }
-        Some(sheets)
+    /// The stretches of all sheets between the parameters at which the bodies change that they may cross.
+    pub(super) fn stretches(&self) -> Vec<(usize, [f64; 2])> {
+        let of = |(number, sheet): (usize, &Sheet)| {
+            let cuts = sheet.atlas.cuts();
+            let pairs = cuts.windows(2).map(|w| (number, [w[0], w[1]]));
+            pairs.collect::<Vec<_>>()
+        };
+        self.sheets.iter().enumerate().flat_map(of).collect()
     }
 
     /// Questions to bodies so far, for stretches of paths and for places of crossings, times their prices.
@@ -118,75 +151,102 @@ impl Faces {
         })
     }
 
-    /// The quantities per unit of the piece's parameter, and the [`extremes`](Self::extremes).
-    pub(super) fn flux_and_extremes(&self, sheet: Sheet, t: f64) -> (Flux, [f64; 6]) {
+    /// The quantities per unit of the patch's parameter, the [`extremes`](Self::extremes), and what was seen.
+    pub(super) fn flux_and_extremes(&self, sheet: usize, t: f64) -> (Flux, [f64; 6], Option<Seen>) {
         let mut flux = [0.0; QUANTITIES];
         let mut extremes = [f64::NEG_INFINITY; 6];
         let Some(rule) = self.rule(sheet, t) else {
-            return (flux, extremes);
+            return (flux, extremes, None);
         };
-        let edges = self.visible(sheet, &rule, &mut |range, sign| {
+        let seen = self.visible(sheet, t, &rule, &mut |range, sign| {
             add_flux(&rule, range, sign, &mut flux);
             add_extremes(&rule, range, &mut extremes);
         });
         #[allow(clippy::cast_precision_loss, reason = "a count of crossings")]
-        let edges = edges as f64;
-        flux[QUANTITIES - 1] = edges * self.bodies[sheet.body].pace(sheet.patch, t);
-        (flux, extremes)
+        let edges = seen.crossings as f64;
+        let Sheet { body, patch, .. } = self.sheets[sheet];
+        flux[QUANTITIES - 1] = edges * self.bodies[body].pace(patch, t);
+        (flux, extremes, Some(seen))
     }
 
     /// The largest coordinates along the six directions +x, +y, +z, -x, -y, -z.
-    pub(super) fn extremes(&self, sheet: Sheet, t: f64) -> [f64; 6] {
+    pub(super) fn extremes(&self, sheet: usize, t: f64) -> [f64; 6] {
         let mut extremes = [f64::NEG_INFINITY; 6];
         if let Some(rule) = self.rule(sheet, t) {
-            self.visible(sheet, &rule, &mut |range, _| {
+            self.visible(sheet, t, &rule, &mut |range, _| {
                 add_extremes(&rule, range, &mut extremes);
             });
         }
         extremes
     }
 
+    /// What is seen of the line at `t`; `None` where it has no extent.
+    pub(super) fn seen(&self, sheet: usize, t: f64) -> Option<Seen> {
+        let rule = self.rule(sheet, t)?;
+        Some(self.visible(sheet, t, &rule, &mut |_, _| {}))
+    }
+
     /// The line of a sheet at parameter `t`; `None` where it has no extent.
-    fn rule(&self, sheet: Sheet, t: f64) -> Option<Rule> {
-        self.bodies[sheet.body].rule(sheet.patch, t, self.hair)
+    fn rule(&self, sheet: usize, t: f64) -> Option<Rule> {
+        let Sheet { body, patch, .. } = self.sheets[sheet];
+        self.bodies[body].rule(patch, t, self.hair)
+    }
+
+    /// Where the line of a sheet crosses other bodies, with those, in order.
+    fn cuts(&self, sheet: &Sheet, t: f64, rule: &Rule) -> Vec<(f64, usize)> {
+        let [a, b] = rule.range;
+        let mut cuts = Vec::new();
+        let mut found = Vec::new();
+        for band in sheet.atlas.bands(t) {
+            let k = band.body;
+            let Some((_, remains)) = sheet.remains.iter().find(|r| r.0 == k) else {
+                continue;
+            };
+            let range = band.share.map(|s| a + (b - a) * s);
+            let mut search = |path: &Path, found: &mut Vec<f64>| {
+                // The paths differ by a hair.
+                let room = [0.125 * self.hair, 4.0 * self.hair];
+                let searched = path.crossings(&self.bodies[k], remains, range, room, found);
+                let work = searched.questions * self.prices[k];
+                self.work.fetch_add(work, Ordering::Relaxed);
+                searched.along
+            };
+            found.clear();
+            if remains.is_partial() || search(&rule.path, &mut found) {
+                found.clear();
+                search(&rule.beside[0], &mut found);
+                search(&rule.beside[1], &mut found);
+            }
+            cuts.extend(found.iter().map(|&s| (s, k)));
+        }
+        cuts.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
+        cuts
     }
 
     /// Calls `each` with the stretches of a rule on the composite's boundary, and +1 where its
-    /// normal is the body's, -1 where it is the opposite; returns the number of crossings.
-    fn visible(&self, sheet: Sheet, rule: &Rule, each: &mut impl FnMut([f64; 2], f64)) -> usize {
+    /// normal is the body's, -1 where it is the opposite.
+    fn visible(
+        &self,
+        sheet: usize,
+        t: f64,
+        rule: &Rule,
+        each: &mut impl FnMut([f64; 2], f64),
+    ) -> Seen {
+        let sheet = &self.sheets[sheet];
         let [a, b] = rule.range;
-        let mut cuts = Vec::new();
-        let around = bounds(&rule.path, rule.range, 4.0 * self.hair);
-        // What a body sweeps meets no face of its own; its flat caps do.
-        let own = sheet.patch.cap.map(|_| &sheet.body);
-        for &k in self.others[sheet.body].iter().chain(own) {
-            let other = &self.bodies[k];
-            if !touch(&around, &other.bounds()) {
-                continue;
-            }
-            // The two paths differ by a hair, but where they run along the other body.
-            let room = [0.125 * self.hair, 4.0 * self.hair];
-            let search = |path: &Path, cuts: &mut Vec<f64>| {
-                let found = path.crossings(other, rule.range, room, cuts);
-                let work = found.questions * self.prices[k];
-                self.work.fetch_add(work, Ordering::Relaxed);
-                found.along
-            };
-            if search(&rule.beside[1], &mut cuts) {
-                search(&rule.beside[0], &mut cuts);
-            }
-        }
-        let crossings = cuts.len();
-        cuts.push(b);
-        cuts.sort_by(f64::total_cmp);
+        let cuts = self.cuts(sheet, t, rule);
+        let mut signature = Signature::new(NARROW * (b - a));
         let mut from = a;
         let mut stretch: Option<([f64; 2], f64)> = None;
         let mut emit = |s: Option<([f64; 2], f64)>| {
-            if let Some((range, sign)) = s {
+            if let Some((range, sign)) = s
+                && sign != 0.0
+            {
                 each(range, sign);
             }
         };
-        for to in cuts {
+        let ends = cuts.iter().copied().chain([(b, usize::MAX)]);
+        for (to, by) in ends {
             // Between the crossings of the two paths beside a point nothing is lost.
             if !(to - from > 1e-14 * (b - a)) {
                 continue;
@@ -197,17 +257,21 @@ impl Faces {
             if sign != 0.0 && self.belongs_to_earlier(sheet.body, rule.path.at(m)) {
                 sign = 0.0;
             }
+            signature.add(to - from, sign, by);
             match &mut stretch {
                 Some((range, same)) if *same == sign => range[1] = to,
                 _ => {
-                    emit(stretch.take().filter(|s| s.1 != 0.0));
+                    emit(stretch.take());
                     stretch = Some(([from, to], sign));
                 }
             }
             from = to;
         }
-        emit(stretch.filter(|s| s.1 != 0.0));
-        crossings
+        emit(stretch);
+        Seen {
+            crossings: cuts.len(),
+            signature: signature.number(),
+        }
     }
 
     /// Whether an earlier body's surface passes there too.
@@ -229,16 +293,62 @@ pub(super) fn direction(k: usize) -> DVec3 {
     if k < 3 { axis } else { -axis }
 }
 
-fn bounds(path: &Path, range: [f64; 2], margin: f64) -> Aabb {
-    let of = |k: usize| path.furthest(direction(k), range);
+fn grown(b: &Aabb, by: f64) -> Aabb {
     Aabb {
-        min: -DVec3::new(of(3), of(4), of(5)) - margin,
-        max: DVec3::new(of(0), of(1), of(2)) + margin,
+        min: b.min - by,
+        max: b.max + by,
     }
 }
 
 fn touch(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
+}
+
+/// The order of the stretches of a line and of what ends them.
+struct Signature {
+    narrow: f64,
+    hash: u64,
+    /// The stretch that is not yet told: its sign and the body at its end.
+    last: Option<(f64, usize)>,
+}
+
+impl Signature {
+    fn new(narrow: f64) -> Self {
+        Self {
+            narrow,
+            hash: 0xcbf2_9ce4_8422_2325,
+            last: None,
+        }
+    }
+
+    /// Goes on by a stretch of that length, ended by a body; what is narrow counts for nothing.
+    fn add(&mut self, length: f64, sign: f64, by: usize) {
+        #[allow(clippy::float_cmp, reason = "signs are exact")]
+        match &mut self.last {
+            Some((_, end)) if length <= self.narrow => *end = by.min(*end),
+            Some((same, end)) if *same == sign => *end = by,
+            last => {
+                if let Some(told) = last.replace((sign, by)) {
+                    self.tell(told);
+                }
+            }
+        }
+    }
+
+    /// One step of the FNV-1a hash of words.
+    fn tell(&mut self, (sign, by): (f64, usize)) {
+        for word in [sign.to_bits(), by as u64] {
+            self.hash = (self.hash ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+            self.hash ^= self.hash >> 29;
+        }
+    }
+
+    fn number(mut self) -> u64 {
+        if let Some(told) = self.last.take() {
+            self.tell((told.0, usize::MAX));
+        }
+        self.hash
+    }
 }
 
 /// Nodes and weights of Gauss's rule with 10 points on [-1, 1], the positive half.

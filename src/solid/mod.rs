@@ -6,6 +6,7 @@
 
 mod analytic;
 mod assembly;
+mod atlas;
 mod block;
 mod body;
 mod bounds;
@@ -17,15 +18,15 @@ mod flux;
 mod fraction;
 mod measure;
 mod oblique;
+mod panels;
 mod part;
 mod patch_fraction;
-
 mod patches;
 mod path;
+mod remains;
 mod revolved;
 mod row;
 mod rule;
-mod seeds;
 mod swept;
 mod terms;
 mod turn;

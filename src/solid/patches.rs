@@ -12,8 +12,7 @@ use super::measure::Moments;
 use super::path::{Path, Stretch};
 use super::revolved::Revolved;
 use super::row::{Cuts, Row};
-use super::rule::{Area, Normal, Patch, Rule};
-use super::seeds::Seeds;
+use super::rule::{Area, Cover, Normal, Patch, Rule};
 use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::{Aabb, Dd, Real, Side, Similarity};
@@ -447,10 +446,24 @@ impl Patches {
     }
 
     /// The outer faces: lines of constant first parameter.
-    pub(super) fn patches(&self, _seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
-        let faces = 0..self.nets.faces.faces().len();
-        let cuts = || (0..=8).map(|k| f64::from(k) / 8.0).collect();
-        faces.map(|number| (Patch::face(number), cuts())).collect()
+    pub(super) fn patches(&self) -> Vec<Patch> {
+        (0..self.nets.faces.faces().len())
+            .map(Patch::face)
+            .collect()
+    }
+
+    /// A ball around the part of a face between two parameters and two shares of its lines.
+    pub(super) fn cover(&self, patch: Patch, t: [f64; 2], s: [f64; 2]) -> Cover {
+        let cell = &self.nets.faces.faces()[patch.number].surface;
+        let scale = self.frame.scale();
+        let middle = [0.5 * (t[0] + t[1]), 0.5 * (s[0] + s[1])];
+        let centre = cell.evaluate(middle).unwrap_or_default();
+        let [across, along] = speeds(cell);
+        Cover {
+            centre: self.frame.to_world(DVec3::from_array(centre)),
+            across: 0.5 * (t[1] - t[0]) * across * scale,
+            along: 0.5 * (s[1] - s[0]) * along * scale,
+        }
     }
 
     pub(super) fn pace(&self, patch: Patch, t: f64) -> f64 {
@@ -488,6 +501,26 @@ impl Patches {
             area: Area::OfNormal,
         })
     }
+}
+
+/// Bounds on the length per unit of each parameter of a rational patch: G. Farin's for curves, of every row of
+/// its net.
+fn speeds(cell: &BezierCell<2>) -> [f64; 2] {
+    let [p, q] = cell.degrees();
+    let net = cell.control_points();
+    let weights = net.iter().map(|h| h.weight);
+    let (low, high) = weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
+    let at = |i: usize, j: usize| DVec3::from_array(net[j * (p + 1) + i].to_point());
+    let first = (0..p).flat_map(|i| (0..=q).map(move |j| (i, j)));
+    let second = (0..=p).flat_map(|i| (0..q).map(move |j| (i, j)));
+    let most = |steps: &mut dyn Iterator<Item = f64>| steps.fold(0.0, f64::max);
+    #[allow(clippy::cast_precision_loss, reason = "degrees")]
+    let degrees = [p as f64, q as f64];
+    let ratio = (high / low).powi(2);
+    [
+        degrees[0] * ratio * most(&mut first.map(|(i, j)| at(i + 1, j).distance(at(i, j)))),
+        degrees[1] * ratio * most(&mut second.map(|(i, j)| at(i, j + 1).distance(at(i, j)))),
+    ]
 }
 
 /// The region that is turned, where the nets show one about the z axis.
@@ -612,12 +645,6 @@ impl FaceLine {
         #[allow(clippy::cast_precision_loss, reason = "a degree")]
         let degree = (self.points.len() - 1) as f64;
         degree * steps.fold(0.0, f64::max) * (high / low).powi(2)
-    }
-
-    /// The largest `direction · x` that control points reach: a bound.
-    pub(super) fn reach(&self, direction: DVec3) -> f64 {
-        let heights = self.points.iter().map(|h| direction.dot(xyz(*h) / h[3]));
-        heights.fold(f64::NEG_INFINITY, f64::max) + direction.dot(self.origin)
     }
 
     /// The same line in a body's own coordinates.

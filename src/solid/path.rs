@@ -7,6 +7,7 @@
 
 use super::body::Body;
 use super::patches::FaceLine;
+use super::remains::Remains;
 use super::turn::Turn;
 use crate::math::{Aabb, Side};
 use glam::{DVec2, DVec3};
@@ -184,14 +185,6 @@ impl Path {
         matches!(self, Self::Face { .. })
     }
 
-    /// A bound on [`support`](Self::support).
-    pub(super) fn furthest(&self, direction: DVec3, range: [f64; 2]) -> f64 {
-        match self {
-            Self::Face { line, off } => line.reach(direction) + off.abs() * direction.length(),
-            _ => self.support(direction, range),
-        }
-    }
-
     /// The largest `direction · x` between two parameters.
     pub(super) fn support(&self, direction: DVec3, [a, b]: [f64; 2]) -> f64 {
         let ends = direction.dot(self.at(a)).max(direction.dot(self.at(b)));
@@ -276,11 +269,12 @@ impl Path {
         }
     }
 
-    /// Adds the parameters between `a` and `b` at which the path crosses the body's surface.
+    /// Adds the parameters between `a` and `b` at which the path crosses what remains of the body's surface.
     /// Coordinates are known to within `margin`; within `near` the path counts as running along it.
     pub(super) fn crossings(
         &self,
         body: &Body,
+        remains: &Remains,
         [a, b]: [f64; 2],
         [margin, near]: [f64; 2],
         out: &mut Vec<f64>,
@@ -289,18 +283,11 @@ impl Path {
         let mut along = false;
         let speed = self.speed();
         // Distances up to a limit: where one is only compared, farther faces need no search.
-        let distance = |s: f64, limit: f64| {
-            let p = self.at(s);
-            match body {
-                // The same on both sides, and the side is the dearer question.
-                Body::Patches(b) => b.distance(p, false, limit),
-                _ => body.distance(p, body.side(p) != Side::Outside, limit),
-            }
-        };
+        let distance = |s: f64, limit: f64| remains.distance(body, self.at(s), limit);
         let signed = |s: f64, limit: f64| {
             let p = self.at(s);
             let outside = body.side(p) == Side::Outside;
-            let d = body.distance(p, !outside, limit);
+            let d = remains.distance(body, p, limit);
             if outside {
                 d.max(f64::MIN_POSITIVE)
             } else {

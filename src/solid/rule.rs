@@ -27,6 +27,16 @@ impl Patch {
     }
 }
 
+/// A ball around a part of a patch: its radius is the sum of both lengths.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cover {
+    pub(super) centre: DVec3,
+    /// What the part adds to the radius across the lines, in scene units.
+    pub(super) across: f64,
+    /// And along them.
+    pub(super) along: f64,
+}
+
 /// A line on a patch with what its integrals need.
 pub(super) struct Rule {
     pub(super) path: Path,

@@ -2,15 +2,14 @@
 
 use super::path::{Path, Stretch};
 use super::revolved::Revolved;
-use super::rule::{Area, Normal, Patch, Rule};
-use super::seeds::Seeds;
+use super::rule::{Area, Cover, Normal, Patch, Rule};
 use super::turn::Turn;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
 impl Revolved {
     /// What a piece sweeps, and its part of each cap.
-    pub(super) fn patches(&self, seeds: &Seeds) -> Vec<(Patch, Vec<f64>)> {
+    pub(super) fn patches(&self) -> Vec<Patch> {
         let turned = *self.turn() != Turn::Full;
         let mut patches = Vec::new();
         for (number, part) in self.boundary().iter().enumerate() {
@@ -22,13 +21,49 @@ impl Revolved {
             } else {
                 &[None]
             };
-            let cuts = seeds.cuts(&part.piece);
-            patches.extend(
-                caps.iter()
-                    .map(|&cap| (Patch { number, cap }, cuts.clone())),
-            );
+            patches.extend(caps.iter().map(|&cap| Patch { number, cap }));
         }
         patches
+    }
+
+    /// A ball around the part of a patch between two parameters of its piece and two shares of its lines.
+    pub(super) fn cover(&self, patch: Patch, t: [f64; 2], s: [f64; 2]) -> Cover {
+        let twin = &self.boundary()[patch.number].piece.twin;
+        // Neither coordinate turns within a piece.
+        let [a, b] = t.map(|t| {
+            let p = twin.at(t);
+            DVec2::new(p[0] + twin.origin[0], p[1] + twin.origin[1])
+        });
+        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a).abs());
+        let scale = self.frame().scale();
+        match (patch.cap, self.turn()) {
+            (Some(cap), Turn::Partial(wedge)) => {
+                let d = wedge.directions()[cap];
+                let (low, high) = (s[0] * (middle.x - half.x), s[1] * (middle.x + half.x));
+                let r = 0.5 * (low + high);
+                // What the ends of the lines move is counted to the one side, their length to the other.
+                let along = 0.5 * (s[1] - s[0]) * middle.x;
+                Cover {
+                    centre: self
+                        .frame()
+                        .to_world(DVec3::new(d.x * r, d.y * r, middle.y)),
+                    across: (half.y + (0.5 * (high - low) - along).max(0.0)) * scale,
+                    along: along * scale,
+                }
+            }
+            _ => {
+                let [from, to] = angles(self.turn());
+                let (sin, cos) = (from + 0.5 * (s[0] + s[1]) * (to - from)).sin_cos();
+                let r = middle.x;
+                Cover {
+                    centre: self
+                        .frame()
+                        .to_world(DVec3::new(r * cos, r * sin, middle.y)),
+                    across: half.length() * scale,
+                    along: 0.5 * (s[1] - s[0]) * (to - from) * (middle.x + half.x) * scale,
+                }
+            }
+        }
     }
 
     /// Length of the piece per unit of its parameter, in scene units.

@@ -1,0 +1,325 @@
+//! The integrals over the faces of a composite along the parameter of each patch.
+//!
+//! While the order of a line's visible stretches, and of the bodies that end them, stays the same, the integrand is
+//! smooth in the line's parameter, but for edges of a body that the ends pass. Where the order changes a line touches a
+//! surface, and the integrand has a square root, or it steps. Such a place is closed in on between two lines of
+//! different order down to the resolution of the parameter; the stretches between two such places are integrated in a
+//! variable in which square roots at the ends are smooth:
+//!
+//! ```text
+//!   t = a + w u² (3 - 2 u)       w = b - a, 0 <= u <= 1;   a + w u² or b - w (1 - u)² with one such end
+//! ```
+//!
+//! by Gauss-Kronrod panels, halved where the estimates are largest.
+
+use super::faces::{Faces, QUANTITIES, Seen};
+use crate::math::quadrature::{Integral, panel_of};
+use rayon::prelude::*;
+
+/// Estimated errors to reach, relative to area, volume, volume times size and its square.
+const TOLERANCE: f64 = 1e-12;
+/// Panels replaced between two looks at the work.
+const BATCH: usize = 64;
+/// How often a stretch is cut where the order of its lines changes, one cut within another.
+const MOST_CUTS: u32 = 12;
+/// Changes of order between the lines of one panel that are closed in on; of more it is halved.
+const MOST_CHANGES: usize = 4;
+/// Places of the quantities.
+pub(super) const AREA: usize = 0;
+pub(super) const VOLUME: usize = 1;
+pub(super) const FIRST: usize = 2;
+pub(super) const SQUARES: usize = 5;
+pub(super) const PRODUCTS: usize = 8;
+const EDGES: usize = 11;
+
+/// A line of a sheet: its parameter, and what stands for the order of its stretches.
+type Line = (f64, u64);
+
+/// A stretch of a sheet.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    sheet: usize,
+    t: [f64; 2],
+    /// At which ends the order of the lines changes.
+    graded: [bool; 2],
+    /// How many cuts it is within.
+    cuts: u32,
+}
+
+impl Span {
+    /// The parameter of the sheet and its derivative at `u` of [0, 1].
+    fn place(&self, u: f64) -> (f64, f64) {
+        let [a, b] = self.t;
+        let (w, v) = (b - a, 1.0 - u);
+        match self.graded {
+            [false, false] => (a + w * u, w),
+            [true, false] => (a + w * u * u, 2.0 * w * u),
+            [false, true] => (b - w * v * v, 2.0 * w * v),
+            // From the nearer end, for the rounding.
+            [true, true] if u < 0.5 => (a + w * u * u * (3.0 - 2.0 * u), 6.0 * w * u * v),
+            [true, true] => (b - w * v * v * (3.0 - 2.0 * v), 6.0 * w * u * v),
+        }
+    }
+}
+
+/// A part of a span with its integrals.
+pub(super) struct Panel {
+    span: Span,
+    /// Within [0, 1].
+    u: [f64; 2],
+    pub(super) integrals: [Integral; QUANTITIES],
+    /// For each direction the furthest circle looked at: how far it reaches, and its parameter.
+    pub(super) furthest: [(f64, f64); 6],
+    /// The first and the last line.
+    ends: Option<[Line; 2]>,
+    /// Neighbouring lines of different order.
+    changes: Vec<[Line; 2]>,
+}
+
+impl Panel {
+    fn new(faces: &Faces, span: Span, u: [f64; 2]) -> Self {
+        let mut furthest = [(f64::NEG_INFINITY, span.place(u[0]).0); 6];
+        let mut lines: Vec<Line> = Vec::new();
+        let mut flux = |u| {
+            let (t, slope) = span.place(u);
+            let (flux, extremes, seen) = faces.flux_and_extremes(span.sheet, t);
+            for (best, reach) in furthest.iter_mut().zip(extremes) {
+                if reach > best.0 {
+                    *best = (reach, t);
+                }
+            }
+            lines.extend(seen.map(|s: Seen| (t, s.signature)));
+            flux.map(|f| f * slope)
+        };
+        let integrals = panel_of(&mut flux, u[0], u[1]);
+        lines.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let pairs = lines.windows(2).filter(|w| w[0].1 != w[1].1);
+        let changes = pairs.map(|w| [w[0], w[1]]).collect();
+        let ends = lines.first().zip(lines.last()).map(|(a, b)| [*a, *b]);
+        Self {
+            span,
+            u,
+            integrals,
+            furthest,
+            ends,
+            changes,
+        }
+    }
+
+    pub(super) fn sheet(&self) -> usize {
+        self.span.sheet
+    }
+
+    /// The parameters of the sheet between which it lies.
+    pub(super) fn range(&self) -> [f64; 2] {
+        self.u.map(|u| self.span.place(u).0)
+    }
+
+    /// Whether the other goes on where this one ends.
+    pub(super) fn is_followed_by(&self, other: &Self) -> bool {
+        #[allow(clippy::float_cmp, reason = "halving keeps the ends")]
+        let meets = self.range()[1] == other.range()[0];
+        meets && self.sheet() == other.sheet()
+    }
+
+    /// Whether it can be cut or halved at all.
+    fn divides(&self) -> bool {
+        let [a, b] = self.range();
+        b - a > 1e-13 * a.abs().max(b.abs())
+    }
+
+    /// Whether the order of its lines changes and may be followed up.
+    fn is_to_be_cut(&self) -> bool {
+        !self.changes.is_empty() && self.span.cuts < MOST_CUTS && self.divides()
+    }
+
+    /// What takes its place.
+    fn parts(&self, faces: &Faces) -> Vec<(Span, [f64; 2])> {
+        if self.is_to_be_cut() && self.changes.len() <= MOST_CHANGES {
+            let mut places = Vec::new();
+            for change in &self.changes {
+                close_in(faces, self.sheet(), *change, &mut places);
+            }
+            self.cut_at(&places)
+        } else {
+            self.halves()
+        }
+    }
+
+    fn halves(&self) -> Vec<(Span, [f64; 2])> {
+        let [a, b] = self.u;
+        let m = 0.5 * (a + b);
+        let mut span = self.span;
+        if !self.changes.is_empty() {
+            span.cuts += 1;
+        }
+        vec![(span, [a, m]), (span, [m, b])]
+    }
+
+    /// The spans between its ends and the places, in order, where the order of its lines changes.
+    fn cut_at(&self, places: &[f64]) -> Vec<(Span, [f64; 2])> {
+        let [from, to] = self.range();
+        let own = |end: usize| {
+            #[allow(clippy::float_cmp, reason = "ends are kept")]
+            let whole = self.u[end] == [0.0, 1.0][end];
+            whole && self.span.graded[end]
+        };
+        let mut graded = own(0);
+        let mut spans = Vec::new();
+        let mut start = from;
+        let mut add = |start: f64, end: f64, graded: [bool; 2]| {
+            if end > start {
+                let span = Span {
+                    t: [start, end],
+                    graded,
+                    cuts: self.span.cuts + 1,
+                    ..self.span
+                };
+                spans.push((span, [0.0, 1.0]));
+            }
+        };
+        for &place in places {
+            let place = place.clamp(start, to);
+            add(start, place, [graded, true]);
+            (start, graded) = (place, true);
+        }
+        #[allow(clippy::float_cmp, reason = "clamped to it")]
+        let ends_there = places.last().is_some_and(|&p| p >= to);
+        add(start, to, [graded, own(1) || ends_there]);
+        spans
+    }
+
+    /// The error of quantity `k` that is not the panel's: the hair moves the edges by as much, a few
+    /// times that where faces meet at a slant, and what it moves is at most as far from the centre
+    /// as a body; and the rounding of the sum.
+    pub(super) fn noise(&self, k: usize, faces: &Faces) -> f64 {
+        let power = match k {
+            AREA => 0,
+            VOLUME => 1,
+            FIRST..SQUARES => 2,
+            _ => 3,
+        };
+        let moved = 4.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
+        // Where the order of the lines is unknown, so is all.
+        let unknown = if self.changes.is_empty() {
+            0.0
+        } else {
+            self.integrals[k].value.abs()
+        };
+        moved + unknown + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
+    }
+
+    /// The largest error as a multiple of its tolerance.
+    fn excess(&self, tolerances: &[f64; QUANTITIES]) -> f64 {
+        let errors = self.integrals.iter().zip(tolerances);
+        errors.fold(0.0, |m, (i, t)| m.max(i.error / t))
+    }
+}
+
+/// The places between two lines of different order where it changes, to the resolution of the parameter.
+fn close_in(faces: &Faces, sheet: usize, [mut from, to]: [Line; 2], places: &mut Vec<f64>) {
+    for _ in 0..MOST_CHANGES {
+        let (mut low, mut high) = (from.0, to);
+        loop {
+            let middle = 0.5 * (low + high.0);
+            if !(middle > low && middle < high.0 && high.0 - low > f64::EPSILON * high.0.abs()) {
+                break;
+            }
+            match faces.seen(sheet, middle) {
+                Some(seen) if seen.signature != from.1 => high = (middle, seen.signature),
+                _ => low = middle,
+            }
+        }
+        places.push(0.5 * (low + high.0));
+        if high.1 == to.1 {
+            return;
+        }
+        from = high;
+    }
+}
+
+/// Panels in order whose estimated errors sum to the tolerances, or the best that `most` questions give; `None` where
+/// even the first take more.
+pub(super) fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Panel>> {
+    let stretches = faces.stretches().into_iter().map(|(sheet, t)| {
+        let span = Span {
+            sheet,
+            t,
+            graded: [false; 2],
+            cuts: 0,
+        };
+        (span, [0.0, 1.0])
+    });
+    let mut panels = made(faces, stretches.collect(), most)?;
+    loop {
+        let chosen = worst(&panels, faces, &tolerances(&panels, size));
+        let mut replaced = Vec::new();
+        for batch in chosen.chunks(BATCH) {
+            let parts = batch.par_iter().flat_map(|&i| panels[i].parts(faces));
+            let Some(parts) = made(faces, parts.collect(), most) else {
+                break;
+            };
+            replaced.extend_from_slice(batch);
+            panels.extend(parts);
+        }
+        let all = replaced.len() == chosen.len();
+        replaced.sort_unstable();
+        for &i in replaced.iter().rev() {
+            panels.swap_remove(i);
+        }
+        panels.sort_by(|a, b| {
+            let start = |p: &Panel| p.range()[0];
+            a.sheet()
+                .cmp(&b.sheet())
+                .then(start(a).total_cmp(&start(b)))
+        });
+        if !all || chosen.is_empty() {
+            return Some(panels);
+        }
+    }
+}
+
+/// The panels of all stretches; `None` where the work passes `most`, or has passed it, whatever the order of the work.
+fn made(faces: &Faces, work: Vec<(Span, [f64; 2])>, most: u64) -> Option<Vec<Panel>> {
+    work.into_par_iter()
+        .map(|(span, u)| {
+            let panel = (faces.work() <= most).then(|| Panel::new(faces, span, u));
+            panel.filter(|_| faces.work() <= most)
+        })
+        .collect()
+}
+
+/// The panels to be replaced for the rest to be good: those between whose lines the order changes, and of those with
+/// the largest errors the ones that halving mends, the largest first.
+fn worst(panels: &[Panel], faces: &Faces, tolerances: &[f64; QUANTITIES]) -> Vec<usize> {
+    let excess = |(i, p): (usize, &Panel)| (p.excess(tolerances), i);
+    let mut order: Vec<(f64, usize)> = panels.iter().enumerate().map(excess).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut left: f64 = order.iter().map(|o| o.0).sum();
+    // Halving does not mend rounding.
+    let noisy = |p: &Panel| {
+        let least = |k: usize| p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0);
+        (AREA..EDGES).all(|k| p.integrals[k].error <= least(k))
+    };
+    let chosen = order.iter().filter(|(excess, i)| {
+        let panel = &panels[*i];
+        let more = left > 0.5;
+        left -= excess;
+        panel.is_to_be_cut() || more && panel.divides() && !noisy(panel)
+    });
+    chosen.map(|o| o.1).collect()
+}
+
+/// Errors that are good enough.
+fn tolerances(panels: &[Panel], size: f64) -> [f64; QUANTITIES] {
+    let sum = |k: usize| panels.iter().map(|p| p.integrals[k].value).sum::<f64>();
+    let area = sum(AREA).abs().max(f64::MIN_POSITIVE);
+    // Below this the volume is rounding.
+    let volume = sum(VOLUME).abs().max(1e-12 * area * size);
+    let mut tolerances = [f64::INFINITY; QUANTITIES];
+    tolerances[AREA] = TOLERANCE * area;
+    tolerances[VOLUME] = TOLERANCE * volume;
+    tolerances[FIRST..SQUARES].fill(TOLERANCE * volume * size);
+    tolerances[SQUARES..EDGES].fill(TOLERANCE * volume * size * size);
+    tolerances
+}
