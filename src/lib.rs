@@ -79,7 +79,7 @@
 //! assert!(solid.contains(DVec3::new(0.0, 3.5, 0.25)));
 //! assert!((solid.signed_distance(DVec3::ZERO) - 2.0).abs() < 1e-14);
 //! let exact = 6.0 * std::f64::consts::PI.powi(2);
-//! assert!((scene.exact_volume().expect("one solid") - exact).abs() < 1e-12);
+//! assert!((scene.exact_volume().expect("one solid").value - exact).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -103,7 +103,7 @@ fn fractions_sum_to_the_exact_volume() {
         let fractions = sample::fraction(&scene, &grid).expect("small");
         let sum: f64 =
             fractions.data().iter().map(|&f| f64::from(f)).sum::<f64>() * grid.voxel_volume();
-        let exact = scene.exact_volume().expect("one body");
+        let exact = scene.exact_volume().expect("one body").value;
         eprintln!(
             "{name}: {sum} of {exact}, relative {:.1e}",
             (sum - exact).abs() / exact

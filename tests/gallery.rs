@@ -107,7 +107,7 @@ fn every_scene_has_its_row_and_its_picture() {
 }
 
 fn exact_volume(scene: &Scene) -> String {
-    let volume = scene.exact_volume().expect("a volume");
+    let volume = scene.exact_volume().expect("a volume").value;
     // As many digits as every machine agrees on.
     format!("{volume:.9e} {}³", scene.model().units.name())
 }
@@ -133,7 +133,7 @@ fn row(name: &str) -> String {
     let grid = scene.grid().expect("a grid");
     let fractions = sample::fraction(&scene, &grid).expect("a volume");
     let sum: f64 = fractions.data().iter().map(|&f| f64::from(f)).sum();
-    let exact = scene.exact_volume().expect("a volume");
+    let exact = scene.exact_volume().expect("a volume").value;
     let error = (sum * grid.voxel_volume() - exact).abs() / exact;
     let meshes = meshes(&scene, 0.1 * grid.spacing().min_element()).expect("meshes");
     let report =

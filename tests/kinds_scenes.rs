@@ -150,7 +150,7 @@ fn of_patch(points: &[[f64; 3]], weights: &[f64]) -> f64 {
 #[track_caller]
 fn check(name: &str, wanted: f64, relative: f64) {
     let scene = Scene::load(format!("scenes/{name}.toml")).expect("a shipped scene");
-    let found = scene.exact_volume().expect("a volume");
+    let found = scene.exact_volume().expect("a volume").value;
     assert!(
         (found - wanted).abs() <= relative * wanted,
         "{name}: {found}, wanted {wanted}"

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use serde_json::Value;
-use support::{run, run_within, shipped, shipped_names};
+use support::{run, run_within, scratch, shipped, shipped_names};
 
 const TWO: &str = r#"
 schema = 1
@@ -179,4 +179,92 @@ fn failures_have_their_exit_codes_and_threads_change_nothing() {
             .out
     };
     assert_eq!(of("1"), of("3"));
+}
+
+/// A vessel of part of a turn with a port across both faces of its wall: its total takes longer than a small run.
+const VESSEL: &str = r#"
+schema = 1
+[profiles.wall]
+loops = [
+  [{ kind = "ellipse", center = [6, 0], radii = [2.2, 3.4] }],
+  [{ kind = "ellipse", center = [6, 0], radii = [2.0, 3.2] }],
+]
+[[solid]]
+kind = "revolve"
+profile = "wall"
+angle = 270
+start = 45
+[[solid]]
+kind = "cylinder"
+radius = 0.8
+height = 3
+axis = { origin = [-4.2, -4.2, 2.8] }
+"#;
+
+const BORED: &str = r#"
+schema = 1
+[[solid]]
+kind = "box"
+size = [4, 4, 1]
+[[solid]]
+kind = "cylinder"
+radius = 1
+height = 4
+operation = "subtract"
+axis = { origin = [0, 0, -2] }
+"#;
+
+/// The document and the manifest of a small run, and what `info` says of it.
+fn sampled(text: &str) -> (Value, Value, String) {
+    let folder = scratch();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (scene, out) = (path("scene.toml"), path("out"));
+    std::fs::write(&scene, text).expect("a scene is written");
+    let limit = Duration::from_secs(30);
+    let arguments = [
+        "voxelize",
+        &scene,
+        "-o",
+        &out,
+        "--resolution",
+        "16",
+        "--channels",
+        "occupancy",
+        "--json",
+    ];
+    let document = run_within(limit, "", &arguments).exits(0).json();
+    let manifest = folder.path().join("out").join("manifest.json");
+    let manifest = std::fs::read_to_string(manifest).expect("a manifest");
+    let manifest = serde_json::from_str(&manifest).expect("JSON");
+    let info = run(&["info", &out]).exits(0).out;
+    (document, manifest, info)
+}
+
+#[test]
+fn a_run_that_samples_does_not_wait_for_a_total() {
+    let (document, manifest, info) = sampled(VESSEL);
+    for d in [&document, &manifest] {
+        assert!(d["volume_exact"].is_null() && d["volume_exact_error"].is_null());
+        let warnings = d["warnings"].as_array().expect("a list");
+        let said = |w: &Value| w.as_str().is_some_and(|w| w.starts_with("volume_exact:"));
+        assert!(warnings.iter().any(said), "{warnings:?}");
+    }
+    assert!(
+        info.contains("not measured") && !info.contains("exact\n"),
+        "{info}"
+    );
+    // The same run again has the same answer.
+    assert_eq!(sampled(VESSEL).1["volume_exact"], manifest["volume_exact"]);
+}
+
+#[test]
+fn a_total_comes_with_its_error() {
+    let (document, manifest, info) = sampled(BORED);
+    for d in [&document, &manifest] {
+        let volume = d["volume_exact"].as_f64().expect("a volume");
+        let error = d["volume_exact_error"].as_f64().expect("an error");
+        assert!((volume - (16.0 - PI)).abs() <= error, "{volume} {error}");
+        assert!(error <= 1e-9 * volume, "{error}");
+    }
+    assert!(info.contains(" exact"), "{info}");
 }

@@ -259,7 +259,7 @@ fn grids_agree_with_points() {
                     }
                 }
             }
-            let exact = one.exact_volume().expect("few solids");
+            let exact = one.exact_volume().expect("few solids").value;
             let found = volume * grid.spacing().element_product();
             assert!(
                 (found - exact).abs() < 1e-6 * exact,

@@ -100,7 +100,7 @@ fn a_gap_that_a_profile_closes_is_closed_in_its_volume() {
                     );
                 }
                 let (a, b) = [&volume, &turned]
-                    .map(|s| s.exact_volume().expect("one solid"))
+                    .map(|s| s.exact_volume().expect("one solid").value)
                     .into();
                 assert!((a - b).abs() < 1e-8, "{a} {b}");
             }

@@ -311,7 +311,7 @@ fn shared_faces_are_no_boundary() {
     assert!(!perturbed.assembly().contains(DVec3::new(3.0, 1.0, 2.05)));
     let (a, b) = (
         perturbed.measures().expect("one"),
-        perturbed.exact_volume().expect("one"),
+        perturbed.exact_volume().expect("one").value,
     );
     assert_eq!(a.volume, b);
     // The bump: ∬ B_1(u) B_1(v) 0.4 dx dy over a face of 2 by 2.

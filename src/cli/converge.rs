@@ -66,6 +66,7 @@ pub(super) fn run(
         "units": scene.model().units.name(),
         "reference": scene.model().resolve().get("reference"),
         "volume": found.volume,
+        "volume_error": found.volume_error,
         "offsets": plan.offsets,
         "rows": found.rows.iter().map(entry).collect::<Vec<_>>(),
         "orders": orders(&found),
@@ -140,8 +141,8 @@ fn csv(study: &Study) -> String {
 
 fn table(study: &Study, units: &str) -> String {
     let mut text = format!(
-        "volume {} {units}^3; errors of volumes relative, of distances in {units}\n\n",
-        study.volume
+        "volume {}; errors of volumes relative, of distances in {units}\n\n",
+        output::volume(study.volume, Some(study.volume_error), units)
     );
     let head = [
         "resolution",

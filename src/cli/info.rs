@@ -38,6 +38,7 @@ pub(super) fn run(
         "volume_occupancy": m.volume_occupancy,
         "volume_fraction": m.volume_fraction,
         "volume_exact": m.volume_exact,
+        "volume_exact_error": m.volume_exact_error,
         "solids": m.solids,
         "materials": m.materials,
         "material_volumes": m.material_volumes,
@@ -110,7 +111,17 @@ fn holdings(m: &Manifest) -> String {
         format!("{} by occupancy", volume(m.volume_occupancy)),
     );
     line("", format!("{} by fraction", volume(m.volume_fraction)));
-    line("", format!("{} exact", volume(m.volume_exact)));
+    let measured = |value: Option<f64>, error: Option<f64>| {
+        value.map_or_else(
+            || "not measured".to_owned(),
+            |v| {
+                let shown = output::volume(v, error, &m.units);
+                let exact = output::is_exact(v, error);
+                format!("{shown} {}", if exact { "exact" } else { "measured" })
+            },
+        )
+    };
+    line("", measured(m.volume_exact, m.volume_exact_error));
     for one in &m.material_volumes {
         let name = one
             .name
@@ -122,11 +133,8 @@ fn holdings(m: &Manifest) -> String {
                 volume(one.volume_occupancy)
             )
         });
-        let exact = volume(one.volume_exact);
-        line(
-            "material",
-            format!("{}{name}: {sampled}{exact} exact", one.id),
-        );
+        let exact = measured(one.volume_exact, one.volume_exact_error);
+        line("material", format!("{}{name}: {sampled}{exact}", one.id));
     }
     let count = |pointer: &str| m.certainty.pointer(pointer).and_then(Value::as_u64);
     if let (Some(exact), Some(bounds)) = (count("/exact"), count("/lower_bound")) {

@@ -15,6 +15,25 @@ pub(super) const NOTHING_LEFT: &str =
 /// Whether the document of this run is printed, or being printed: there is one, also where a signal comes.
 static ANSWERED: AtomicBool = AtomicBool::new(false);
 
+/// What is said where the total is more work than a run that samples waits for.
+pub(super) const VOLUME_NOT_MEASURED: &str = "volume_exact: not measured, as the solids meet so often, or so nearly, that it would take longer than the sampling should wait; `voxlathe measure` takes the time";
+
+/// The error of a measured volume, relative to it, up to which it is called exact.
+const EXACT: f64 = 1e-9;
+
+/// Whether a measured volume may be called exact.
+pub(super) fn is_exact(value: f64, error: Option<f64>) -> bool {
+    error.is_some_and(|e| e <= EXACT * value.abs())
+}
+
+/// A measured volume with its unit, and with its error where that says something.
+pub(super) fn volume(value: f64, error: Option<f64>, units: &str) -> String {
+    match error {
+        Some(error) if !is_exact(value, Some(error)) => format!("{value} +- {error:.1e} {units}^3"),
+        _ => format!("{value} {units}^3"),
+    }
+}
+
 /// The user's wishes about output.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Console {

@@ -43,7 +43,7 @@ pub(super) fn run(
     }
     let scene = Scene::load_with(&arguments.scene, &common.set)?;
     let mut warnings = scene.warnings().to_vec();
-    if scene.assembly().is_empty() || scene.exact_volume() == Some(0.0) {
+    if scene.is_known_empty() {
         warnings.push(NOTHING_LEFT.into());
     }
     let interrupted = || interrupt::check().is_err();

@@ -4,7 +4,7 @@ use super::arguments::{Common, Voxelize};
 use super::failure::Failure;
 use super::interrupt;
 use super::memory::{self, Budget, Need};
-use super::output::{self, Console, NOTHING_LEFT};
+use super::output::{self, Console, NOTHING_LEFT, VOLUME_NOT_MEASURED};
 use crate::error::Error;
 use crate::grid::GridSpec;
 use crate::io::available_bytes;
@@ -109,8 +109,8 @@ pub(super) fn run(
     let manifest = writer.finish(summary)?;
     // The last files on their way to the disk, and the renames.
     let write = write + placed.elapsed().as_secs_f64();
-    if is_empty(&scene) {
-        console.warn(NOTHING_LEFT);
+    if let Some(said) = said_of_volume(&scene) {
+        console.warn(said);
     }
     let seconds = Seconds {
         prepare,
@@ -501,16 +501,19 @@ fn preview(scene: &Scene, plan: &Plan, writer: &StackWriter) -> Result<(), Failu
     Ok(())
 }
 
-/// Whether the composite has no volume at all.
-fn is_empty(scene: &Scene) -> bool {
-    scene.exact_volume() == Some(0.0)
+/// What is to be said of the composite's volume, where it is nothing or not known.
+fn said_of_volume(scene: &Scene) -> Option<&'static str> {
+    match scene.volume_beside_sampling() {
+        None => Some(VOLUME_NOT_MEASURED),
+        Some(v) => (v.value == 0.0).then_some(NOTHING_LEFT),
+    }
 }
 
 fn warnings(scene: &Scene, plan: &Plan) -> Vec<String> {
-    let nothing = is_empty(scene).then(|| NOTHING_LEFT.to_owned());
+    let volume = said_of_volume(scene).map(str::to_owned);
     let said = scene.warnings().iter().cloned();
     said.chain(scene.grid_warning(&plan.grid))
-        .chain(nothing)
+        .chain(volume)
         .collect()
 }
 
@@ -546,19 +549,25 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<MaterialVo
         .collect();
     ids.sort_unstable();
     ids.dedup();
+    let only = ids.len() == 1;
     let one = |id: u32| {
         let voxels = tally.materials.get(&id).copied().unwrap_or(0);
         let sampled = plan.selection.material.then_some(voxels);
         #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
         let volume = sampled.map(|n| n as f64 * voxel);
-        let part = scene.assembly().of_material(id);
-        let exact = part.and_then(|m| Some(m.moments()?.volume.value));
+        let exact = if only {
+            scene.volume_beside_sampling()
+        } else {
+            let part = scene.assembly().of_material(id);
+            part.and_then(|part| Scene::volume_of(&part))
+        };
         MaterialVolume {
             id,
             name: scene.model().materials.get(&id).cloned(),
             voxels: sampled,
             volume_occupancy: volume,
-            volume_exact: exact,
+            volume_exact: exact.map(|v| v.value),
+            volume_exact_error: exact.map(|v| v.error),
         }
     };
     ids.into_iter().map(one).collect()
@@ -582,7 +591,8 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         .collect();
     StackSummary {
         bounds: Some([b.min.to_array(), b.max.to_array()]),
-        volume_exact: scene.exact_volume(),
+        volume_exact: scene.volume_beside_sampling().map(|v| v.value),
+        volume_exact_error: scene.volume_beside_sampling().map(|v| v.error),
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
         warnings: warnings(scene, plan),
@@ -621,7 +631,8 @@ fn document(
         "voxels_inside": manifest.and_then(|m| m.voxels_inside),
         "volume_occupancy": manifest.and_then(|m| m.volume_occupancy),
         "volume_fraction": manifest.and_then(|m| m.volume_fraction),
-        "volume_exact": scene.exact_volume(),
+        "volume_exact": scene.volume_beside_sampling().map(|v| v.value),
+        "volume_exact_error": scene.volume_beside_sampling().map(|v| v.error),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": memory::peak(),
         "warnings": warnings(scene, plan),
@@ -675,7 +686,16 @@ fn report(scene: &Scene, arguments: &Voxelize, manifest: &Manifest, seconds: &Se
     };
     volume("by occupancy", manifest.volume_occupancy);
     volume("by fraction", manifest.volume_fraction);
-    volume("exact", manifest.volume_exact);
+    if let Some(value) = manifest.volume_exact {
+        let error = manifest.volume_exact_error;
+        let label = if output::is_exact(value, error) {
+            "exact"
+        } else {
+            "measured"
+        };
+        let shown = output::volume(value, error, units);
+        let _ = writeln!(text, "volume {label:<13} {shown}");
+    }
     let _ = writeln!(
         text,
         "{:.2} s (sampling {:.2}, writing {:.2})",

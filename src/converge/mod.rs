@@ -14,6 +14,7 @@ mod plot;
 pub use fit::order;
 
 use crate::grid::GridSpec;
+use crate::math::quadrature::Integral;
 use crate::sample::{LayerBuffers, LayerSampler, Selection};
 use crate::scene::{GridStep, Scene};
 use crate::work::in_parts;
@@ -36,8 +37,8 @@ pub struct Row {
     pub volume_occupancy_mean_error: f64,
     /// Relative error of the volume by fractions, absolute-valued.
     pub volume_fraction_error: f64,
-    /// What it is at most: [`FRACTION_BOUND`] for each voxel that is neither full nor empty, and
-    /// the rounding of f32.
+    /// What it is at most: [`FRACTION_BOUND`] for each voxel that is neither full nor empty, the rounding of f32, and
+    /// what the volume compared with may be off by.
     pub volume_fraction_bound: f64,
     /// Largest error of the stored distances, in scene units.
     pub sdf_max_error: f64,
@@ -68,6 +69,8 @@ pub struct Study {
     pub orders: Orders,
     /// The volume compared with, in cubed scene units.
     pub volume: f64,
+    /// How wrong it may be, in cubed scene units; the rows' bounds include it.
+    pub volume_error: f64,
 }
 
 /// What a study asks for.
@@ -133,10 +136,17 @@ pub fn study_with(
     done: &mut dyn FnMut(&Row),
 ) -> Result<Study, Error> {
     let volume = match scene.reference() {
-        Some(reference) => Some(reference.volume()),
+        Some(reference) => Some(Integral {
+            value: reference.volume(),
+            error: 0.0,
+        }),
         None => scene.exact_volume(),
     };
-    let volume = volume.filter(|v| *v > 0.0).ok_or(Error::NoReference)?;
+    let volume = volume.filter(|v| v.value > 0.0);
+    let Integral {
+        value: volume,
+        error: volume_error,
+    } = volume.ok_or(Error::NoReference)?;
     let mut rows = Vec::new();
     for &resolution in &plan.resolutions {
         let looked = Looked {
@@ -144,7 +154,8 @@ pub fn study_with(
             workers,
             stop,
         };
-        let row = row(looked, resolution, volume, plan.offsets)?;
+        let mut row = row(looked, resolution, volume, plan.offsets)?;
+        row.volume_fraction_bound += volume_error / volume;
         done(&row);
         rows.push(row);
     }
@@ -153,6 +164,7 @@ pub fn study_with(
         rows,
         orders,
         volume,
+        volume_error,
     })
 }
 

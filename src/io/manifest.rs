@@ -73,8 +73,10 @@ pub struct Manifest {
     pub volume_occupancy: Option<f64>,
     /// Volume as the sum of `fraction` times the volume of a voxel, in cubed scene units.
     pub volume_fraction: Option<f64>,
-    /// Volume of the solid itself, in cubed scene units.
+    /// Volume of the solid itself, in cubed scene units; `None` where it was not measured.
     pub volume_exact: Option<f64>,
+    /// How wrong that may be, in cubed scene units.
+    pub volume_exact_error: Option<f64>,
     /// What is known about each solid.
     pub solids: serde_json::Value,
     /// Names of material ids.
@@ -101,8 +103,10 @@ pub struct MaterialVolume {
     pub voxels: Option<u64>,
     /// Volume as `voxels` times the volume of a voxel, in cubed scene units.
     pub volume_occupancy: Option<f64>,
-    /// Its volume in the solid itself, in cubed scene units.
+    /// Its volume in the solid itself, in cubed scene units; `None` where it was not measured.
     pub volume_exact: Option<f64>,
+    /// How wrong that may be, in cubed scene units.
+    pub volume_exact_error: Option<f64>,
 }
 
 /// The grid in a manifest; see [`GridSpec`].
@@ -230,9 +234,11 @@ impl Manifest {
         finite("volume_occupancy", self.volume_occupancy.as_slice())?;
         finite("volume_fraction", self.volume_fraction.as_slice())?;
         finite("volume_exact", self.volume_exact.as_slice())?;
+        finite("volume_exact_error", self.volume_exact_error.as_slice())?;
         for material in &self.material_volumes {
             finite("volume_occupancy", material.volume_occupancy.as_slice())?;
             finite("volume_exact", material.volume_exact.as_slice())?;
+            finite("volume_exact_error", material.volume_exact_error.as_slice())?;
         }
         for channel in &self.channels {
             finite("range", &channel.range.unwrap_or_default())?;
@@ -424,6 +430,7 @@ pub(super) mod tests {
             volume_occupancy: None,
             volume_fraction: None,
             volume_exact: Some(0.1 + 0.2),
+            volume_exact_error: Some(1e-16),
             solids: serde_json::Value::Null,
             materials: serde_json::json!({ "1": "glass" }),
             warnings: vec![],
@@ -433,6 +440,7 @@ pub(super) mod tests {
                 voxels: Some(12),
                 volume_occupancy: Some(1.5),
                 volume_exact: None,
+                volume_exact_error: None,
             }],
             certainty: serde_json::Value::Null,
             scene: serde_json::json!({ "schema": 1 }),

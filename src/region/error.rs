@@ -83,6 +83,18 @@ pub enum RegionError {
         /// The most meetings allowed.
         limit: usize,
     },
+    /// The profile is so thin, beside how far it reaches, that its points cannot be told apart.
+    #[error(
+        "the profile is {thin:e} thin and reaches {reach:e} far; it must be at least {allowed:e} thick for that"
+    )]
+    Thin {
+        /// The shorter side of its bounds, in scene units.
+        thin: f64,
+        /// Its largest coordinate.
+        reach: f64,
+        /// The least shorter side for that.
+        allowed: f64,
+    },
     /// The loops enclose nothing.
     #[error("the profile encloses no area")]
     NoArea,
@@ -106,7 +118,7 @@ impl RegionError {
             | Self::Curve {
                 loop_index, curve, ..
             } => Some((*loop_index, Some(*curve))),
-            Self::NoArea | Self::Tangle { .. } => None,
+            Self::NoArea | Self::Tangle { .. } | Self::Thin { .. } => None,
         }
     }
 }

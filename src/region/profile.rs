@@ -104,6 +104,10 @@ pub struct Region {
     warnings: Vec<String>,
 }
 
+/// The least shorter side of a profile's bounds, in its unit: a thousand times what points of one profile are told
+/// apart by.
+const THIN: f64 = 1024.0 * boundary::SAME_PROFILE;
+
 /// A loop of pieces in scene units, before scaling.
 struct Chain {
     pieces: Vec<Link>,
@@ -248,6 +252,7 @@ impl Region {
         let unit = into_unit(&mut chains)?;
         let given = cuts(&chains);
         let size = profile_size(&given);
+        refuse_thin(&given, rules.boundary, unit)?;
         let whole = |cut: &[Vec<Cut>]| -> Result<Vec<Piece>, RegionError> {
             let mut pieces = Vec::new();
             for (i, cuts) in cut.iter().enumerate() {
@@ -444,6 +449,31 @@ fn boundary_size(boundary: &[BoundaryPiece]) -> f64 {
 }
 
 fn profile_size(loops: &[Vec<Cut>]) -> f64 {
+    let [min, max] = extent(loops);
+    (max[0] - min[0]).max(max[1] - min[1])
+}
+
+/// An error where what is turned is so thin that its points fall together.
+fn refuse_thin(loops: &[Vec<Cut>], boundary: Boundary, unit: f64) -> Result<(), RegionError> {
+    let [mut min, mut max] = extent(loops);
+    let coordinates = min.iter().chain(&max);
+    let reach = coordinates.fold(0.0_f64, |m, c| m.max(c.abs()));
+    if boundary == Boundary::ToAxis {
+        (min[0], max[0]) = (min[0].min(0.0), max[0].max(0.0));
+    }
+    let thin = (max[0] - min[0]).min(max[1] - min[1]);
+    if thin > 0.0 && thin < THIN {
+        return Err(RegionError::Thin {
+            thin: thin * unit,
+            reach: reach * unit,
+            allowed: THIN * unit,
+        });
+    }
+    Ok(())
+}
+
+/// The least and the largest coordinates.
+fn extent(loops: &[Vec<Cut>]) -> [[f64; 2]; 2] {
     let mut min = [f64::INFINITY; 2];
     let mut max = [f64::NEG_INFINITY; 2];
     for (_, p) in loops.iter().flatten().flat_map(|c| &c.at) {
@@ -452,7 +482,7 @@ fn profile_size(loops: &[Vec<Cut>]) -> f64 {
             max[c] = max[c].max(p[c].f64());
         }
     }
-    (max[0] - min[0]).max(max[1] - min[1])
+    [min, max]
 }
 
 /// Adds the bi-monotone pieces of one loop, its gaps closed.

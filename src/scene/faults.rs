@@ -83,6 +83,11 @@ pub(super) fn placed(
             "a curve that can be drawn".to_owned(),
             None,
         ),
+        RegionError::Thin { allowed, .. } => (
+            error.to_string(),
+            format!("a profile at least {allowed:e} thick"),
+            Some("check the exponents of its coordinates".to_owned()),
+        ),
         RegionError::Tangle { limit } => (
             error.to_string(),
             format!("loops that meet at most {limit} times"),

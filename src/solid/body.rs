@@ -18,7 +18,6 @@ use super::path::Stretch;
 use super::revolved::Revolved;
 use super::row::{Cuts, LayerCuts, Row};
 use super::rule::{Cover, Patch, Rule};
-use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::HalfSpace;
 use crate::math::{Aabb, Side, Similarity};
@@ -234,11 +233,6 @@ impl Body {
     /// Length across the lines of a patch per unit of its parameter, in scene units.
     pub(super) fn pace(&self, patch: Patch, t: f64) -> f64 {
         family!(self, b => b.pace(patch, t))
-    }
-
-    /// Whether flat caps close a turn.
-    pub(super) fn has_caps(&self) -> bool {
-        self.revolved().is_some_and(|b| *b.turn() != Turn::Full)
     }
 
     /// The body as a turned region where it is one, to some ulps: what a volume is whose nets are proved to be turned.

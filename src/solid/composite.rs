@@ -2,14 +2,13 @@
 //!
 //! Terms that keep apart are measured each by itself, a term of one body by its exact line
 //! integrals. The others are integrated over their faces: circles of the bodies' surfaces cut where
-//! they cross other bodies, their integrals closed form, then Gauss-Kronrod panels along the
-//! profile, halved where the estimates are largest. Where a circle touches another body the
-//! integrand has a root or a step; halving closes in on it.
+//! they cross other bodies, their integrals closed form, then along the profile in panels between the
+//! places where the order of these crossings changes.
 //!
 //! Volumes whose nets are proved to be turned take part as the turned region that they are.
 //!
-//! * Error: the panels' estimates, the hair by which a surface's sides are told apart times the
-//!   length of the edges, and the rounding of the sums.
+//! * Error: the panels' estimates, what the rounding of distances moves the edges between faces by, and
+//!   the rounding of the sums.
 
 use super::assembly::Assembly;
 use super::body::Body;
@@ -26,9 +25,9 @@ use std::sync::Arc;
 /// How far the surface of a turned region may be from that of the volumes it stands for, in ε times the furthest
 /// coordinate: a control point may be 8 ε (size + |P|) from where it is taken for.
 const STAND_IN: f64 = 64.0;
-/// Questions to solids, after which estimates are taken as they are, or the composite is not measured: half a
-/// minute's work.
-const MOST_WORK: u64 = 40_000_000;
+/// Questions to solids, after which estimates are taken as they are, or the composite is not measured: some
+/// seconds' work.
+const MOST_WORK: u64 = 12_000_000;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 

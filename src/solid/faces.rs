@@ -9,6 +9,7 @@
 
 use super::atlas::{Atlas, Rival};
 use super::body::Body;
+use super::grazing::Crossing;
 use super::path::Path;
 use super::remains::Remains;
 use super::rule::{Patch, Rule};
@@ -21,7 +22,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of quantities that are integrated: area, volume, first and second moments, and the
-/// length of the edges between faces.
+/// area by which the edges between faces may be off.
 pub(super) const QUANTITIES: usize = 12;
 
 /// Values of the quantities, in the order of [`QUANTITIES`].
@@ -29,6 +30,18 @@ pub(super) type Flux = [f64; QUANTITIES];
 
 /// How near ends of stretches count as one for the [`Seen::signature`], as a share of the line.
 const NARROW: f64 = 1e-10;
+
+/// How many times the doubt in its ends a stretch must be long to count for it.
+const UNSURE: f64 = 8.0;
+
+/// A place where a line crosses a body.
+#[derive(Debug, Clone, Copy)]
+struct Cut {
+    place: f64,
+    /// How far it may be off, in the parameter of the line.
+    doubt: f64,
+    by: usize,
+}
 
 /// Bodies and terms about a common centre.
 #[derive(Debug)]
@@ -60,8 +73,8 @@ struct Sheet {
 /// What is known of a line of a sheet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Seen {
-    /// How often it crosses other bodies.
-    crossings: usize,
+    /// How far its crossings with other bodies may be from where they are taken for, all together, in scene units.
+    doubt: f64,
     /// A number that stands for the order of its visible stretches and of the bodies that end them: while
     /// it stays the same, the ends move smoothly with the line, but where they pass an edge of a body.
     pub(super) signature: u64,
@@ -134,11 +147,6 @@ impl Faces {
         self.work.load(Ordering::Relaxed)
     }
 
-    /// How far beside a surface its two sides are asked, in scene units.
-    pub(super) fn hair(&self) -> f64 {
-        self.hair
-    }
-
     /// The furthest coordinate of a body.
     pub(super) fn reach(&self) -> f64 {
         self.reach
@@ -162,10 +170,8 @@ impl Faces {
             add_flux(&rule, range, sign, &mut flux);
             add_extremes(&rule, range, &mut extremes);
         });
-        #[allow(clippy::cast_precision_loss, reason = "a count of crossings")]
-        let edges = seen.crossings as f64;
         let Sheet { body, patch, .. } = self.sheets[sheet];
-        flux[QUANTITIES - 1] = edges * self.bodies[body].pace(patch, t);
+        flux[QUANTITIES - 1] = seen.doubt * self.bodies[body].pace(patch, t);
         (flux, extremes, Some(seen))
     }
 
@@ -192,8 +198,8 @@ impl Faces {
         self.bodies[body].rule(patch, t, self.hair)
     }
 
-    /// Where the line of a sheet crosses other bodies, with those, in order.
-    fn cuts(&self, sheet: &Sheet, t: f64, rule: &Rule) -> Vec<(f64, usize)> {
+    /// Where the line of a sheet crosses other bodies, in order.
+    fn cuts(&self, sheet: &Sheet, t: f64, rule: &Rule) -> Vec<Cut> {
         let [a, b] = rule.range;
         let mut cuts = Vec::new();
         let mut found = Vec::new();
@@ -203,7 +209,7 @@ impl Faces {
                 continue;
             };
             let range = band.share.map(|s| a + (b - a) * s);
-            let mut search = |path: &Path, found: &mut Vec<f64>| {
+            let search = |path: &Path, found: &mut Vec<Crossing>| {
                 // The paths differ by a hair.
                 let room = [0.125 * self.hair, 4.0 * self.hair];
                 let searched = path.crossings(&self.bodies[k], remains, range, room, found);
@@ -212,14 +218,24 @@ impl Faces {
                 searched.along
             };
             found.clear();
-            if remains.is_partial() || search(&rule.path, &mut found) {
+            let beside = remains.is_partial() || search(&rule.path, &mut found);
+            if beside {
                 found.clear();
-                search(&rule.beside[0], &mut found);
+                // Outward of its own cap there is nothing of a body.
+                if k != sheet.body {
+                    search(&rule.beside[0], &mut found);
+                }
                 search(&rule.beside[1], &mut found);
             }
-            cuts.extend(found.iter().map(|&s| (s, k)));
+            // What a distance is off by, over the slope at which it rises along the line.
+            let off = if beside { 2.0 } else { 1.0 / 16.0 } * self.hair;
+            cuts.extend(found.iter().map(|c| Cut {
+                place: c.place,
+                doubt: (off / c.slope).min(range[1] - range[0]),
+                by: k,
+            }));
         }
-        cuts.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
+        cuts.sort_by(|p, q| p.place.total_cmp(&q.place).then(p.by.cmp(&q.by)));
         cuts
     }
 
@@ -245,10 +261,17 @@ impl Faces {
                 each(range, sign);
             }
         };
-        let ends = cuts.iter().copied().chain([(b, usize::MAX)]);
-        for (to, by) in ends {
+        let end = Cut {
+            place: b,
+            doubt: 0.0,
+            by: usize::MAX,
+        };
+        let mut doubt = 0.0;
+        for cut in cuts.iter().chain([&end]) {
+            let to = cut.place;
             // Between the crossings of the two paths beside a point nothing is lost.
             if !(to - from > 1e-14 * (b - a)) {
+                signature.add(0.0, 0.0, cut.by);
                 continue;
             }
             let m = 0.5 * (from + to);
@@ -257,7 +280,8 @@ impl Faces {
             if sign != 0.0 && self.belongs_to_earlier(sheet.body, rule.path.at(m)) {
                 sign = 0.0;
             }
-            signature.add(to - from, sign, by);
+            signature.add(to - from - UNSURE * (doubt + cut.doubt), sign, cut.by);
+            doubt = cut.doubt;
             match &mut stretch {
                 Some((range, same)) if *same == sign => range[1] = to,
                 _ => {
@@ -269,7 +293,7 @@ impl Faces {
         }
         emit(stretch);
         Seen {
-            crossings: cuts.len(),
+            doubt: cuts.iter().map(|c| c.doubt).sum::<f64>() * rule.path.speed(),
             signature: signature.number(),
         }
     }
@@ -326,6 +350,7 @@ impl Signature {
         #[allow(clippy::float_cmp, reason = "signs are exact")]
         match &mut self.last {
             Some((_, end)) if length <= self.narrow => *end = by.min(*end),
+            None if length <= self.narrow => {}
             Some((same, end)) if *same == sign => *end = by,
             last => {
                 if let Some(told) = last.replace((sign, by)) {

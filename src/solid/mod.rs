@@ -16,6 +16,7 @@ mod ellipsoid;
 mod faces;
 mod flux;
 mod fraction;
+mod grazing;
 mod measure;
 mod oblique;
 mod panels;

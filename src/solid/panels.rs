@@ -15,13 +15,14 @@
 use super::faces::{Faces, QUANTITIES, Seen};
 use crate::math::quadrature::{Integral, panel_of};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Estimated errors to reach, relative to area, volume, volume times size and its square.
 const TOLERANCE: f64 = 1e-12;
 /// Panels replaced between two looks at the work.
 const BATCH: usize = 64;
 /// How often a stretch is cut where the order of its lines changes, one cut within another.
-const MOST_CUTS: u32 = 12;
+const MOST_CUTS: u32 = 6;
 /// Changes of order between the lines of one panel that are closed in on; of more it is halved.
 const MOST_CHANGES: usize = 4;
 /// Places of the quantities.
@@ -128,9 +129,23 @@ impl Panel {
         b - a > 1e-13 * a.abs().max(b.abs())
     }
 
+    /// Whether an end is that of its span, where the order of the lines changes.
+    fn is_graded(&self, end: usize) -> bool {
+        #[allow(clippy::float_cmp, reason = "halving keeps the ends")]
+        let whole = self.u[end] == [0.0, 1.0][end];
+        whole && self.span.graded[end]
+    }
+
+    /// Whether its edges are known: where they are as uncertain as its area is large, the order of its lines is
+    /// that of roundings.
+    fn is_certain(&self) -> bool {
+        self.integrals[EDGES].value.abs() <= 0.01 * self.integrals[AREA].value.abs()
+    }
+
     /// Whether the order of its lines changes and may be followed up.
     fn is_to_be_cut(&self) -> bool {
-        !self.changes.is_empty() && self.span.cuts < MOST_CUTS && self.divides()
+        let may = self.span.cuts < MOST_CUTS && self.is_certain() && self.divides();
+        !self.changes.is_empty() && may
     }
 
     /// What takes its place.
@@ -159,12 +174,7 @@ impl Panel {
     /// The spans between its ends and the places, in order, where the order of its lines changes.
     fn cut_at(&self, places: &[f64]) -> Vec<(Span, [f64; 2])> {
         let [from, to] = self.range();
-        let own = |end: usize| {
-            #[allow(clippy::float_cmp, reason = "ends are kept")]
-            let whole = self.u[end] == [0.0, 1.0][end];
-            whole && self.span.graded[end]
-        };
-        let mut graded = own(0);
+        let mut graded = self.is_graded(0);
         let mut spans = Vec::new();
         let mut start = from;
         let mut add = |start: f64, end: f64, graded: [bool; 2]| {
@@ -185,13 +195,12 @@ impl Panel {
         }
         #[allow(clippy::float_cmp, reason = "clamped to it")]
         let ends_there = places.last().is_some_and(|&p| p >= to);
-        add(start, to, [graded, own(1) || ends_there]);
+        add(start, to, [graded, self.is_graded(1) || ends_there]);
         spans
     }
 
-    /// The error of quantity `k` that is not the panel's: the hair moves the edges by as much, a few
-    /// times that where faces meet at a slant, and what it moves is at most as far from the centre
-    /// as a body; and the rounding of the sum.
+    /// The error of quantity `k` that is not the panel's: what the edges may be off by, which is at most as far from
+    /// the centre as a body; and the rounding of the sum.
     pub(super) fn noise(&self, k: usize, faces: &Faces) -> f64 {
         let power = match k {
             AREA => 0,
@@ -199,7 +208,7 @@ impl Panel {
             FIRST..SQUARES => 2,
             _ => 3,
         };
-        let moved = 4.0 * faces.hair() * self.integrals[EDGES].value * faces.reach().powi(power);
+        let moved = self.integrals[EDGES].value.abs() * faces.reach().powi(power);
         // Where the order of the lines is unknown, so is all.
         let unknown = if self.changes.is_empty() {
             0.0
@@ -251,32 +260,69 @@ pub(super) fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Pane
         (span, [0.0, 1.0])
     });
     let mut panels = made(faces, stretches.collect(), most)?;
+    sort(&mut panels);
     loop {
-        let chosen = worst(&panels, faces, &tolerances(&panels, size));
+        let mut places = joints(faces, &panels);
+        let mut chosen: Vec<usize> = places.keys().copied().collect();
+        let others = worst(&panels, faces, &tolerances(&panels, size));
+        chosen.extend(others.into_iter().filter(|i| !places.contains_key(i)));
         let mut replaced = Vec::new();
         for batch in chosen.chunks(BATCH) {
-            let parts = batch.par_iter().flat_map(|&i| panels[i].parts(faces));
+            let parts = batch.par_iter().flat_map(|&i| match places.get(&i) {
+                Some(places) => panels[i].cut_at(places),
+                None => panels[i].parts(faces),
+            });
             let Some(parts) = made(faces, parts.collect(), most) else {
                 break;
             };
             replaced.extend_from_slice(batch);
             panels.extend(parts);
         }
+        places.clear();
         let all = replaced.len() == chosen.len();
         replaced.sort_unstable();
         for &i in replaced.iter().rev() {
             panels.swap_remove(i);
         }
-        panels.sort_by(|a, b| {
-            let start = |p: &Panel| p.range()[0];
-            a.sheet()
-                .cmp(&b.sheet())
-                .then(start(a).total_cmp(&start(b)))
-        });
+        sort(&mut panels);
         if !all || chosen.is_empty() {
             return Some(panels);
         }
     }
+}
+
+fn sort(panels: &mut [Panel]) {
+    let start = |p: &Panel| p.range()[0];
+    panels.sort_by(|a, b| {
+        let by_sheet = a.sheet().cmp(&b.sheet());
+        by_sheet.then(start(a).total_cmp(&start(b)))
+    });
+}
+
+/// For panels beside which the order of the lines changes without a cut, where it does: between the last line of one
+/// and the first of the next. No line of either may be beyond the change.
+fn joints(faces: &Faces, panels: &[Panel]) -> BTreeMap<usize, Vec<f64>> {
+    let open = |&i: &usize| {
+        let (a, b) = (&panels[i], &panels[i + 1]);
+        let changes = a.ends.zip(b.ends).is_some_and(|(a, b)| a[1].1 != b[0].1);
+        let cut = a.is_graded(1) && b.is_graded(0);
+        let mended = |p: &Panel| p.span.cuts < MOST_CUTS && p.is_certain() && p.divides();
+        a.is_followed_by(b) && changes && !cut && mended(a) && mended(b)
+    };
+    let pairs: Vec<usize> = (0..panels.len().saturating_sub(1)).filter(open).collect();
+    let found = pairs.into_par_iter().filter_map(|i| {
+        let [from, to] = [panels[i].ends?[1], panels[i + 1].ends?[0]];
+        let mut places = Vec::new();
+        close_in(faces, panels[i].sheet(), [from, to], &mut places);
+        Some((i, places))
+    });
+    let mut all: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for (i, places) in found.collect::<Vec<_>>() {
+        for k in [i, i + 1] {
+            all.entry(k).or_default().extend(&places);
+        }
+    }
+    all
 }
 
 /// The panels of all stretches; `None` where the work passes `most`, or has passed it, whatever the order of the work.
@@ -296,10 +342,19 @@ fn worst(panels: &[Panel], faces: &Faces, tolerances: &[f64; QUANTITIES]) -> Vec
     let mut order: Vec<(f64, usize)> = panels.iter().enumerate().map(excess).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let mut left: f64 = order.iter().map(|o| o.0).sum();
-    // Halving does not mend rounding.
+    // Halving does not mend rounding, but where that is larger at one end it parts the ends.
     let noisy = |p: &Panel| {
-        let least = |k: usize| p.noise(k, faces).max(1e-3 * tolerances[k] / 64.0);
-        (AREA..EDGES).all(|k| p.integrals[k].error <= least(k))
+        let edges = p.integrals[EDGES];
+        let wide = p.u[1] - p.u[0] > 1.0 / 128.0;
+        let even = !wide || edges.error <= 0.5 * edges.value.abs();
+        let small = |k: usize| tolerances[k] / 64.0;
+        let least = |k: usize| {
+            let noise = if even { p.noise(k, faces) } else { 0.0 };
+            noise.max(1e-3 * small(k))
+        };
+        let over = |k: usize| p.integrals[k].error > least(k);
+        let apart = !even && (AREA..EDGES).any(|k| p.noise(k, faces) > small(k));
+        !apart && !(AREA..EDGES).any(over)
     };
     let chosen = order.iter().filter(|(excess, i)| {
         let panel = &panels[*i];

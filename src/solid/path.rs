@@ -3,9 +3,11 @@
 //! A stretch of a path is left aside where the boxes of the surface's pieces keep clear of it, or
 //! where the distance of its middle exceeds its half length; any other is halved. Below a
 //! ten-thousandth of a turn the signed distances of its ends and its middle stand for all of it,
-//! where a parabola through them leaves no doubt.
+//! where a parabola through them leaves no doubt; above it a polynomial does where it fits them, see
+//! [`Polynomial`].
 
 use super::body::Body;
+use super::grazing::{Crossing, Polynomial};
 use super::patches::FaceLine;
 use super::remains::Remains;
 use super::turn::Turn;
@@ -29,8 +31,10 @@ const TRUST: f64 = 1e-4;
 /// Half width down to which stretches are halved: two crossings nearer to each other than this are
 /// taken for none.
 const FLOOR: f64 = 1e-9;
+/// Share of a stretch's half length below which distances count as small beside it: what runs along a surface.
+const GRAZING: f64 = 1e-3;
 /// Stretches after which only wide ones are halved on: the path runs along the surface.
-const MANY: u64 = 4_096;
+const MANY: u64 = 1_024;
 /// Half width that then counts as fine.
 const COARSE: f64 = 1e-3;
 
@@ -277,7 +281,7 @@ impl Path {
         remains: &Remains,
         [a, b]: [f64; 2],
         [margin, near]: [f64; 2],
-        out: &mut Vec<f64>,
+        out: &mut Vec<Crossing>,
     ) -> Searched {
         let local = self.local(body);
         let mut along = false;
@@ -294,9 +298,15 @@ impl Path {
                 -d
             }
         };
-        let mut work = vec![Open { a, b, ends: None }];
+        let whole = b - a;
+        let mut work = vec![Open {
+            a,
+            b,
+            ends: None,
+            level: 0,
+        }];
         let (mut seen, mut steps) = (0_u64, 0_u64);
-        while let Some(Open { a, b, ends }) = work.pop() {
+        while let Some(Open { a, b, ends, level }) = work.pop() {
             seen += 1;
             let (m, h) = (0.5 * (a + b), 0.5 * (b - a));
             let stretch = Stretch {
@@ -321,6 +331,24 @@ impl Path {
             if middle.abs() >= clear {
                 continue;
             }
+            if !small && (level % 2 == 0 || middle.abs() <= GRAZING * clear) {
+                let within = |s: f64| signed(s, 4.0 * clear + limit);
+                steps += 9;
+                let made = Polynomial::new(&within, m, h, 0.25 * margin, 2.0 * clear);
+                let runs = made.as_ref().is_some_and(|f| f.is_within(near));
+                along |= runs;
+                if runs {
+                    continue;
+                }
+                if let Some((f, changes)) = made.and_then(|f| f.changes().map(|c| (f, c))) {
+                    for change in changes {
+                        let (crossing, taken) = f.polished(&within, change, 0.25 * margin);
+                        out.push(crossing);
+                        steps += taken;
+                    }
+                    continue;
+                }
+            }
             let mut values = None;
             if small {
                 // What is so near to the middle is at most this far.
@@ -333,14 +361,28 @@ impl Path {
                     Crossings::None => continue,
                     Crossings::One => {
                         let (place, taken) = root(&within, [a, b], [fa, fb], 0.25 * margin);
-                        out.push(place);
+                        out.push(Crossing {
+                            place,
+                            slope: (fb - fa).abs() / (b - a),
+                        });
                         steps += taken;
                         continue;
                     }
                     Crossings::Unknown if fine => {
                         if (fa < 0.0) != (fb < 0.0) {
-                            let (place, taken) = root(&within, [a, b], [fa, fb], 0.25 * margin);
-                            out.push(place);
+                            let zero = 0.25 * margin;
+                            let (place, taken) = root(&within, [a, b], [fa, fb], zero);
+                            // Where it touches, the distance is in doubt as far as it stays near 0.
+                            let mut reach = h;
+                            let near_zero = |s: f64| within(s).abs() <= 2.0 * zero;
+                            while reach < whole && near_zero(m - reach) && near_zero(m + reach) {
+                                reach *= 4.0;
+                                steps += 2;
+                            }
+                            out.push(Crossing {
+                                place,
+                                slope: ((fb - fa).abs() / (b - a)).max(2.0 * zero / reach),
+                            });
                             steps += taken;
                         }
                         continue;
@@ -348,7 +390,12 @@ impl Path {
                     Crossings::Unknown => {}
                 }
             }
-            let half = |a, b, ends| Open { a, b, ends };
+            let half = |a, b, ends| Open {
+                a,
+                b,
+                ends,
+                level: level + 1,
+            };
             work.push(half(m, b, values.map(|[_, m, b]| [m, b])));
             work.push(half(a, m, values.map(|[a, m, _]| [a, m])));
         }
@@ -372,6 +419,8 @@ struct Open {
     a: f64,
     b: f64,
     ends: Option<[f64; 2]>,
+    /// How often the path was halved for it.
+    level: u32,
 }
 
 /// How often a stretch crosses a surface.
@@ -418,7 +467,7 @@ fn parabola([a, m, b]: [f64; 3]) -> Crossings {
 ///
 /// By turns a secant, a step beyond where it led, which closes the bracket from the other side, and
 /// a halving, which serves distances that jump: beside an edge of two faces.
-fn root(
+pub(super) fn root(
     signed: &impl Fn(f64) -> f64,
     [mut a, mut b]: [f64; 2],
     [mut fa, mut fb]: [f64; 2],

@@ -117,6 +117,8 @@ pub struct StackSummary {
     pub voxels_inside: Option<u64>,
     /// Volume of the solid itself, in cubed scene units.
     pub volume_exact: Option<f64>,
+    /// How wrong that may be, in cubed scene units.
+    pub volume_exact_error: Option<f64>,
     /// What is known about each solid.
     pub solids: serde_json::Value,
     /// Names of material ids.
@@ -377,6 +379,7 @@ impl StackWriter {
             volume_occupancy,
             volume_fraction,
             volume_exact: summary.volume_exact,
+            volume_exact_error: summary.volume_exact_error,
             solids: summary.solids,
             materials: summary.materials,
             warnings,
