@@ -701,12 +701,10 @@ fn totals_of_many_composites() {
     }
     let all: Vec<&Result> = results.iter().collect();
     line("all", &all);
-    let times: Vec<f64> = all.iter().map(|r| r.seconds).collect();
     let over: Vec<f64> = all
         .iter()
         .map(|r| r.estimate / r.error.max(1e-16))
         .collect();
     eprintln!("estimate over error, median {:.1e}", median(over));
     assert!(failures.is_empty(), "{failures}");
-    assert!(median(times) <= 0.5);
 }

@@ -75,12 +75,16 @@ pub(super) struct Panel {
     ends: Option<[Line; 2]>,
     /// Neighbouring lines of different order.
     changes: Vec<[Line; 2]>,
+    /// By how much the integrands differ from line to line, over the whole panel.
+    spread: [f64; QUANTITIES],
 }
 
 impl Panel {
     fn new(faces: &Faces, span: Span, u: [f64; 2]) -> Self {
         let mut furthest = [(f64::NEG_INFINITY, span.place(u[0]).0); 6];
         let mut lines: Vec<Line> = Vec::new();
+        let mut low = [f64::INFINITY; QUANTITIES];
+        let mut high = [f64::NEG_INFINITY; QUANTITIES];
         let mut flux = |u| {
             let (t, slope) = span.place(u);
             let (flux, extremes, seen) = faces.flux_and_extremes(span.sheet, t);
@@ -90,6 +94,9 @@ impl Panel {
                 }
             }
             lines.extend(seen.map(|s: Seen| (t, s.signature)));
+            for ((low, high), value) in low.iter_mut().zip(&mut high).zip(flux) {
+                (*low, *high) = (low.min(value), high.max(value));
+            }
             flux.map(|f| f * slope)
         };
         let integrals = panel_of(&mut flux, u[0], u[1]);
@@ -97,6 +104,8 @@ impl Panel {
         let pairs = lines.windows(2).filter(|w| w[0].1 != w[1].1);
         let changes = pairs.map(|w| [w[0], w[1]]).collect();
         let ends = lines.first().zip(lines.last()).map(|(a, b)| [*a, *b]);
+        let width = (span.place(u[1]).0 - span.place(u[0]).0).abs();
+        let spread = std::array::from_fn(|k| (high[k] - low[k]) * width);
         Self {
             span,
             u,
@@ -104,6 +113,7 @@ impl Panel {
             furthest,
             ends,
             changes,
+            spread,
         }
     }
 
@@ -209,11 +219,11 @@ impl Panel {
             _ => 3,
         };
         let moved = self.integrals[EDGES].value.abs() * faces.reach().powi(power);
-        // Where the order of the lines is unknown, so is all.
+        // Where the order of the lines is unknown, any of them may stand for the others.
         let unknown = if self.changes.is_empty() {
             0.0
         } else {
-            self.integrals[k].value.abs()
+            self.spread[k]
         };
         moved + unknown + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
     }
@@ -262,7 +272,7 @@ pub(super) fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Pane
     let mut panels = made(faces, stretches.collect(), most)?;
     sort(&mut panels);
     loop {
-        let mut places = joints(faces, &panels);
+        let places = joints(faces, &panels);
         let mut chosen: Vec<usize> = places.keys().copied().collect();
         let others = worst(&panels, faces, &tolerances(&panels, size));
         chosen.extend(others.into_iter().filter(|i| !places.contains_key(i)));
@@ -278,7 +288,6 @@ pub(super) fn integrated(faces: &Faces, size: f64, most: u64) -> Option<Vec<Pane
             replaced.extend_from_slice(batch);
             panels.extend(parts);
         }
-        places.clear();
         let all = replaced.len() == chosen.len();
         replaced.sort_unstable();
         for &i in replaced.iter().rev() {
@@ -346,7 +355,7 @@ fn worst(panels: &[Panel], faces: &Faces, tolerances: &[f64; QUANTITIES]) -> Vec
     let noisy = |p: &Panel| {
         let edges = p.integrals[EDGES];
         let wide = p.u[1] - p.u[0] > 1.0 / 128.0;
-        let even = !wide || edges.error <= 0.5 * edges.value.abs();
+        let even = !wide || edges.error <= 0.05 * edges.value.abs();
         let small = |k: usize| tolerances[k] / 64.0;
         let least = |k: usize| {
             let noise = if even { p.noise(k, faces) } else { 0.0 };

@@ -111,13 +111,16 @@ fn probes(body: &Body, patch: Patch) -> Vec<DVec3> {
     probes
 }
 
+/// Whether a patch lies on a surface, by the distance of a point from that.
+type LiesOn<'a> = dyn Fn(&dyn Fn(DVec3) -> f64) -> bool + 'a;
+
 fn turned(
     body: &Body,
     patch: Patch,
     other: &Revolved,
     own: bool,
     tolerance: f64,
-    lies_on: &dyn Fn(&dyn Fn(DVec3) -> f64) -> bool,
+    lies_on: &LiesOn,
 ) -> Remains {
     let unit = other.frame().scale();
     let keeps = |piece: &Piece| {
@@ -141,7 +144,8 @@ fn turned(
                 let local = other.frame().to_local(p).point;
                 d.perp_dot(DVec2::new(local.x, local.y)).abs() * unit
             };
-            caps[k] = !(own && patch.cap == Some(k)) && !lies_on(&off);
+            let itself = own && patch.cap == Some(k);
+            caps[k] = !(itself || lies_on(&off));
         }
         if left.len() == swept.len() && caps == [true; 2] {
             return Remains::Whole;
