@@ -92,7 +92,6 @@ impl Voxel<'_> {
         let tolerance = self.tolerance(sides);
         self.body(b)
             .fraction_within(&shape, centre, spaces, tolerance)
-            .value
     }
 
     fn cell(&self, centre: DVec3, sides: DVec3) -> Cell {

@@ -78,9 +78,7 @@ impl FractionSampler {
                     [term] if term.factors.len() == 1 => {
                         let one = term.factors[0];
                         let shape = &self.shapes[one.body];
-                        let share = bodies[one.body]
-                            .fraction_within(shape, centre, &[], TOLERANCE)
-                            .value;
+                        let share = bodies[one.body].fraction_within(shape, centre, &[], TOLERANCE);
                         if one.complement { 1.0 - share } else { share }
                     }
                     several => divided::share(assembly, several, centre, self.sides),

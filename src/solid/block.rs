@@ -8,6 +8,7 @@
 //! * Units: local lengths in a power of two of the frame's; h the half side lengths.
 //! * Accuracy: membership exact; distances a few roundings of the largest coordinate.
 
+use super::fraction::SNAP;
 use super::measure::Moments;
 use super::path::{Path, Stretch};
 use super::row::{Cuts, Row};
@@ -132,13 +133,7 @@ impl Block {
         heights.collect()
     }
 
-    /// The share of a voxel within the half-spaces: exact but for rounding.
-    pub(super) fn fraction_within(
-        &self,
-        sides: DVec3,
-        centre: DVec3,
-        spaces: &[HalfSpace],
-    ) -> Integral {
+    pub(super) fn fraction_within(&self, sides: DVec3, centre: DVec3, spaces: &[HalfSpace]) -> f64 {
         let local = self.frame.to_local(centre).point;
         let scale = self.frame.scale();
         let mut all: SmallVec<[HalfSpace; 12]> = SmallVec::new();
@@ -151,9 +146,13 @@ impl Block {
             }
         }
         all.extend_from_slice(spaces);
-        Integral {
-            value: box_volume_within(0.5 * sides, &all) / sides.element_product(),
-            error: 64.0 * f64::EPSILON,
+        let share = box_volume_within(0.5 * sides, &all) / sides.element_product();
+        if share < SNAP {
+            0.0
+        } else if share > 1.0 - SNAP {
+            1.0
+        } else {
+            share
         }
     }
 

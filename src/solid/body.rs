@@ -11,7 +11,7 @@
 
 use super::block::Block;
 use super::ellipsoid::Ellipsoid;
-use super::fraction::{CellShape, SNAP};
+use super::fraction::CellShape;
 use super::measure::{Measures, Moments};
 use super::patches::Patches;
 use super::path::Stretch;
@@ -153,36 +153,27 @@ impl Body {
     }
 
     /// The share of the voxel centred on `centre` that lies in the solid and in all the half-spaces,
-    /// which are given from the voxel's centre, with its error: a proved bound of at most `tolerance` where that is
-    /// within the budget or, where a voxel stands upright on the axis of a turned solid, an estimate of each
-    /// stretch of a surface.
+    /// which are given from the voxel's centre; each stretch of a surface within an estimated error
+    /// of `tolerance`.
     pub(crate) fn fraction_within(
         &self,
         voxel: &VoxelShape,
         centre: DVec3,
         spaces: &[HalfSpace],
         tolerance: f64,
-    ) -> Integral {
-        let found = match (self, &voxel.sections) {
+    ) -> f64 {
+        match (self, &voxel.sections) {
             (Self::Revolved(b), Some(shape)) => b.fraction_within(shape, centre, spaces, tolerance),
             (Self::Ellipsoid(b), Some(shape)) => {
                 b.fraction_within(shape, centre, spaces, tolerance)
             }
             (Self::Block(b), _) => b.fraction_within(voxel.sides, centre, spaces),
-            (Self::Patches(b), _) => b.fraction_within(voxel.sides, centre, spaces, tolerance),
+            (Self::Patches(b), _) => b
+                .fraction_within(voxel.sides, centre, spaces, tolerance)
+                .value
+                .clamp(0.0, 1.0),
             // A shape is made by the body that uses it.
-            _ => Integral::default(),
-        };
-        let value = found.value;
-        Integral {
-            value: if value < SNAP {
-                0.0
-            } else if value > 1.0 - SNAP {
-                1.0
-            } else {
-                value
-            },
-            error: found.error,
+            _ => 0.0,
         }
     }
 

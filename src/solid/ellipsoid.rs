@@ -18,15 +18,13 @@
 //!   integrals* (1995), for the area: S = 4π R_G(a²b², b²c², c²a²).
 
 use super::block::{length, placed_bounds, power_of_two, side_of};
-use super::fraction::CellShape;
+use super::fraction::{CellShape, Clip};
 use super::measure::Moments;
 use super::path::Path;
 use super::revolved::Revolved;
 use super::row::{Cuts, Row};
 use super::rule::{Area, Cover, Normal, Patch, Rule};
 use super::turn::Turn;
-use crate::math::quadrature::Integral;
-use crate::math::similarity::LocalPoint;
 use crate::math::tetrahedra::HalfSpace;
 use crate::math::{Aabb, Dd, Real, Side, Similarity};
 use crate::region::{Boundary, Fill, ProfileCurve, Region};
@@ -177,23 +175,19 @@ impl Ellipsoid {
         centre: DVec3,
         spaces: &[HalfSpace],
         tolerance: f64,
-    ) -> Integral {
+    ) -> f64 {
         let unit = self.ball.frame().scale();
-        let local = self.frame.to_local(centre);
-        let local = LocalPoint {
-            point: local.point / self.radii / unit,
-            error: (local.error + 2.0 * f64::EPSILON * local.point.abs()) / self.radii / unit,
-        };
+        let local = self.frame.to_local(centre).point / self.radii / unit;
         let stretch = self.radii * unit * self.frame.scale();
-        let spaces = spaces.iter().map(|s| {
+        let clips = spaces.iter().map(|s| {
             let along = DVec3::from_array([0, 1, 2].map(|i| self.frame.axis(i).dot(s.normal)));
-            HalfSpace {
+            Clip {
                 normal: along * stretch,
                 offset: s.offset,
             }
         });
         self.ball
-            .local_fraction(shape, local, &spaces.collect(), tolerance)
+            .local_fraction(shape, local, clips.collect(), tolerance)
     }
 
     pub(super) fn moments(&self) -> Moments {

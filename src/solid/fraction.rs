@@ -7,24 +7,22 @@
 //!   V = Σ_k s_k ∫ area(P(z) ∩ disc(r_k(z)) ∩ wedge) dz
 //! ```
 //!
-//! over the heights of the voxel. Where the voxel
-//! stands upright on the axis P and the wedge are the same at every height, the area is closed form, and the integral runs
-//! in the piece's parameter, cut at the radii where the circle meets a corner of the polygon or touches an edge: all
-//! radii at which the area is not analytic. Between them it is, but for (r - r₀)^{3/2} at the cuts, which the substitution
-//! t = 3u² - 2u³ makes smooth. Gauss-Kronrod panels are halved until the error estimate is below what the caller asks.
+//! over the heights of the voxel (MATH: exact volume fraction of a cell, for any orientation). The
+//! area is closed form; the integral runs in the piece's parameter, cut at the heights where the
+//! polygon changes its edges and, for a polygon that does not change with z, at the radii where
+//! the circle meets its corners or touches its edges. In between the integrand is smooth but for
+//! (r - r₀)^{3/2} at the cuts, which the substitution t = 3u² - 2u³ makes smooth. Gauss-Kronrod
+//! panels are halved until the error estimate is below what the caller asks.
 //!
-//! All other voxels are those of [`oblique`](super::oblique).
+//! For a polygon that changes with z the meetings with its corners are sought too, but cuts only
+//! save work: what they leave is found by the halving.
 
-use super::flux::Place;
-use super::oblique::Spaces;
 use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::bernstein;
 use crate::math::disc::{self, Polygon};
-use crate::math::quadrature::{self, Integral};
-use crate::math::similarity::LocalPoint;
 use crate::math::tetrahedra::HalfSpace;
-use crate::math::{Real, Similarity};
+use crate::math::{Real, Similarity, quadrature};
 use crate::region::BoundaryPiece;
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
@@ -35,23 +33,34 @@ pub(super) const SNAP: f64 = 1e-11;
 /// promised, for the few stretches a voxel meets.
 pub(crate) const TOLERANCE: f64 = 1e-8;
 
-/// A voxel in a solid's own coordinates. All voxels of a grid share it.
+/// The cross-sections of a voxel, normal to a solid's axis. All voxels of a grid share it.
 #[derive(Debug, Clone)]
 pub(crate) struct CellShape {
-    edges: [DVec3; 3],
-    upright: Option<Upright>,
-    half_diagonal: f64,
+    /// The eight corners relative to the centre, in local coordinates.
+    corners: [DVec3; 8],
+    /// Distinct heights of corners, ascending, relative to the centre.
+    heights: Vec<f64>,
+    /// For each slab between heights, the edges in counter-clockwise order.
+    slabs: Vec<Vec<[usize; 2]>>,
+    /// Whether the polygon is the same at every height.
+    upright: bool,
     volume: f64,
 }
 
-/// A voxel with the same cross-section normal to the axis at every height.
-#[derive(Debug, Clone)]
-struct Upright {
-    /// Corners relative to the centre, counter-clockwise.
-    polygon: Polygon,
-    low: f64,
-    high: f64,
-}
+const EDGES: [[usize; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
 
 impl CellShape {
     /// The shape of a voxel with those side lengths (scene units) in a solid's frame.
@@ -61,66 +70,96 @@ impl CellShape {
     }
 
     /// The shape of a parallelepiped with those edges, in local coordinates.
-    pub(super) fn of_edges(edges: [DVec3; 3]) -> Self {
+    pub(super) fn of_edges(axes: [DVec3; 3]) -> Self {
         let corners: [DVec3; 8] = std::array::from_fn(|i| {
             let side = |bit: usize| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
-            edges[0] * side(0) + edges[1] * side(1) + edges[2] * side(2)
+            axes[0] * side(0) + axes[1] * side(1) + axes[2] * side(2)
         });
+        let mut heights: Vec<f64> = corners.iter().map(|c| c.z).collect();
+        heights.sort_by(f64::total_cmp);
+        let extent = heights[7] - heights[0];
+        heights.dedup_by(|a, b| (*a - *b).abs() <= 1e-12 * extent);
+        let slabs = heights
+            .windows(2)
+            .map(|w| {
+                let z = 0.5 * (w[0] + w[1]);
+                let mut edges: Vec<([usize; 2], DVec2)> = EDGES
+                    .iter()
+                    .filter(|e| (corners[e[0]].z < z) != (corners[e[1]].z < z))
+                    .map(|&e| (e, on_edge(&corners, e, z)))
+                    .collect();
+                #[allow(clippy::cast_precision_loss, reason = "at most six")]
+                let middle = edges.iter().map(|e| e.1).sum::<DVec2>() / edges.len() as f64;
+                edges.sort_by(|a, b| {
+                    (a.1 - middle)
+                        .to_angle()
+                        .total_cmp(&(b.1 - middle).to_angle())
+                });
+                edges.into_iter().map(|e| e.0).collect()
+            })
+            .collect();
+        let volume = axes[0].cross(axes[1]).dot(axes[2]).abs();
+        let upright = heights.len() == 2;
         Self {
-            edges,
-            upright: Upright::new(&corners),
-            half_diagonal: corners.iter().fold(0.0, |m, c| m.max(c.length())),
-            volume: edges[0].cross(edges[1]).dot(edges[2]).abs(),
+            corners,
+            heights,
+            slabs,
+            upright,
+            volume,
         }
     }
 
     /// Half the diagonal, in local lengths.
     pub(crate) fn half_diagonal(&self) -> f64 {
-        self.half_diagonal
+        self.corners.iter().fold(0.0, |m, c| m.max(c.length()))
+    }
+
+    /// The cross-section at height `z` within a slab, at a voxel centred on `centre`.
+    fn polygon(&self, slab: usize, z: f64, centre: DVec2) -> Polygon {
+        self.slabs[slab]
+            .iter()
+            .map(|&e| on_edge(&self.corners, e, z) + centre)
+            .collect()
     }
 }
 
-impl Upright {
-    /// The shape with those corners; `None` where they are at more than two heights.
-    fn new(corners: &[DVec3; 8]) -> Option<Self> {
-        let low = corners.iter().fold(f64::INFINITY, |m, c| m.min(c.z));
-        let high = corners.iter().fold(f64::NEG_INFINITY, |m, c| m.max(c.z));
-        let near = 1e-12 * (high - low);
-        let flat = |c: &DVec3| DVec2::new(c.x, c.y);
-        let mut polygon: Polygon = (corners.iter().filter(|c| c.z - low <= near))
-            .map(flat)
-            .collect();
-        let above = corners.iter().filter(|c| high - c.z <= near).count();
-        if polygon.len() != 4 || above != 4 {
-            return None;
-        }
-        polygon.sort_by(|a, b| a.to_angle().total_cmp(&b.to_angle()));
-        Some(Self { polygon, low, high })
-    }
+fn on_edge(corners: &[DVec3; 8], [i, j]: [usize; 2], z: f64) -> DVec2 {
+    let (a, b) = (corners[i], corners[j]);
+    let s = ((z - a.z) / (b.z - a.z)).clamp(0.0, 1.0);
+    DVec2::new(a.x + (b.x - a.x) * s, a.y + (b.y - a.y) * s)
 }
 
-/// Whether a half-space leaves the same of every height.
-fn is_upright(space: &HalfSpace) -> bool {
-    space.normal.z.abs() <= 1e-13 * space.normal.length()
+/// A half-space in a solid's frame, from the voxel's centre.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clip {
+    pub(super) normal: DVec3,
+    pub(super) offset: f64,
 }
 
-/// What an upright half-space, given from the voxel's centre, leaves of a cross-section.
-fn clip(polygon: &Polygon, space: &HalfSpace, centre: DVec2) -> Polygon {
-    let normal = DVec2::new(space.normal.x, space.normal.y);
-    let offset = space.offset + normal.dot(centre);
-    let height = |p: DVec2| normal.dot(p) - offset;
-    let mut left = Polygon::new();
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (ha, hb) = (height(a), height(b));
-        if ha <= 0.0 {
-            left.push(a);
-        }
-        if (ha <= 0.0) != (hb <= 0.0) {
-            left.push(a + (b - a) * (ha / (ha - hb)));
-        }
+impl Clip {
+    /// Whether it leaves the same of every height.
+    fn is_upright(&self) -> bool {
+        self.normal.z.abs() <= 1e-13 * self.normal.length()
     }
-    left
+
+    /// What the half-space leaves of a cross-section at height `z` above the voxel's centre.
+    fn of(&self, polygon: &Polygon, z: f64, centre: DVec2) -> Polygon {
+        let normal = DVec2::new(self.normal.x, self.normal.y);
+        let offset = self.offset - self.normal.z * z + normal.dot(centre);
+        let height = |p: DVec2| normal.dot(p) - offset;
+        let mut left = Polygon::new();
+        for (i, &a) in polygon.iter().enumerate() {
+            let b = polygon[(i + 1) % polygon.len()];
+            let (ha, hb) = (height(a), height(b));
+            if ha <= 0.0 {
+                left.push(a);
+            }
+            if (ha <= 0.0) != (hb <= 0.0) {
+                left.push(a + (b - a) * (ha / (ha - hb)));
+            }
+        }
+        left
+    }
 }
 
 /// Convex parts of a cross-section within the turn, with their signs.
@@ -162,6 +201,19 @@ fn disc_area(sections: &Sections, r: f64) -> f64 {
         .sum()
 }
 
+/// One voxel in a solid's frame.
+struct Cell<'a> {
+    shape: &'a CellShape,
+    /// Centre, across the axis and along it.
+    flat: DVec2,
+    z: f64,
+    turn: &'a Turn,
+    reach: Reach,
+    clips: SmallVec<[Clip; 4]>,
+    /// Error allowed to one stretch of a piece, in local volume.
+    tolerance: f64,
+}
+
 impl Revolved {
     /// The share of the voxel that lies in the solid and in all the half-spaces, which are given
     /// from the voxel's centre.
@@ -171,103 +223,162 @@ impl Revolved {
         centre: DVec3,
         spaces: &[HalfSpace],
         tolerance: f64,
-    ) -> Integral {
-        let scale = self.frame().scale();
-        // The frame turns and scales: a normal goes as a vector does, but for the length.
-        let spaces = spaces.iter().map(|s| HalfSpace {
-            normal: self.frame().vector_to_local(s.normal) * scale,
-            offset: s.offset / scale,
-        });
-        let local = self.frame().to_local(centre);
-        self.local_fraction(shape, local, &spaces.collect(), tolerance)
+    ) -> f64 {
+        let local = self.frame().to_local(centre).point;
+        let clips = spaces.iter().map(|s| self.clip(s));
+        self.local_fraction(shape, local, clips.collect(), tolerance)
     }
 
     /// The same in local coordinates.
     pub(super) fn local_fraction(
         &self,
         shape: &CellShape,
-        centre: LocalPoint,
-        spaces: &Spaces,
+        c: DVec3,
+        clips: SmallVec<[Clip; 4]>,
         tolerance: f64,
-    ) -> Integral {
-        let flat = DVec2::new(centre.point.x, centre.point.y);
+    ) -> f64 {
+        let flat = DVec2::new(c.x, c.y);
         let mut reach = Reach::Whole;
-        let mut wedge = None;
-        if let Turn::Partial(turn) = self.turn() {
+        if let Turn::Partial(wedge) = self.turn() {
             let half = shape.half_diagonal();
-            if turn
+            if wedge
                 .directions()
                 .iter()
                 .all(|d| d.perp_dot(flat).abs() > half)
             {
-                if turn.contains(flat, 0.0) == Some(false) {
-                    return Integral::default();
+                if wedge.contains(flat, 0.0) == Some(false) {
+                    return 0.0;
                 }
             } else {
                 reach = Reach::Cut;
-                wedge = Some(turn);
             }
         }
-        match &shape.upright {
-            Some(upright) if spaces.iter().all(is_upright) => {
-                let moved = upright.polygon.iter().map(|p| *p + flat);
-                let left = |polygon, space| clip(&polygon, space, flat);
-                let polygon = spaces.iter().fold(moved.collect(), left);
-                let sections = within_turn(polygon, self.turn(), reach);
-                let heights = [centre.point.z + upright.low, centre.point.z + upright.high];
-                let around = [
-                    (flat.length() - shape.half_diagonal).max(0.0),
-                    flat.length() + shape.half_diagonal,
-                ];
-                let found =
-                    self.upright_volume(&sections, heights, around, tolerance * shape.volume);
-                Integral {
-                    value: found.value / shape.volume,
-                    error: found.error / shape.volume,
-                }
-            }
-            _ => {
-                let place = Place::new(shape.edges, centre.point, centre.error);
-                self.oblique_fraction(&place, spaces, wedge, tolerance)
-            }
+        let cell = Cell {
+            shape,
+            flat,
+            z: c.z,
+            turn: self.turn(),
+            reach,
+            clips,
+            tolerance: tolerance * shape.volume,
+        };
+        let volume: f64 = (0..shape.slabs.len())
+            .map(|slab| self.slab_volume(&cell, slab))
+            .sum();
+        let share = volume / shape.volume;
+        if share < SNAP {
+            0.0
+        } else if share > 1.0 - SNAP {
+            1.0
+        } else {
+            share
         }
     }
 
-    /// The volume over a cross-section, which is between two radii, between two heights.
-    ///
-    /// * `tolerance`: error allowed to one stretch of a piece.
-    fn upright_volume(
-        &self,
-        sections: &Sections,
-        [bottom, top]: [f64; 2],
-        [near, far]: [f64; 2],
-        tolerance: f64,
-    ) -> Integral {
-        let radii = critical_radii(sections);
-        let mut volume = Integral::default();
-        self.boundary_near(bottom, top, near, |part| {
+    /// A half-space in the solid's frame and unit.
+    fn clip(&self, space: &HalfSpace) -> Clip {
+        let scale = self.frame().scale();
+        // The frame turns and scales: a normal goes as a vector does, but for the length.
+        Clip {
+            normal: self.frame().vector_to_local(space.normal) * scale,
+            offset: space.offset / scale,
+        }
+    }
+
+    /// The volume between two heights of corners, in parts within which the half-spaces meet the
+    /// same edges.
+    fn slab_volume(&self, cell: &Cell, slab: usize) -> f64 {
+        let mut heights = cell.meetings(slab);
+        heights.extend([cell.shape.heights[slab], cell.shape.heights[slab + 1]]);
+        heights.sort_by(f64::total_cmp);
+        let parts = heights.windows(2).filter(|h| h[0] < h[1]);
+        parts.map(|h| self.part_volume(cell, slab, h)).sum()
+    }
+
+    fn part_volume(&self, cell: &Cell, slab: usize, heights: &[f64]) -> f64 {
+        let (shape, z) = (cell.shape, cell.z);
+        let (bottom, top) = (heights[0], heights[1]);
+        let fixed = (shape.upright && cell.clips.iter().all(Clip::is_upright))
+            .then(|| cell.sections(slab, z + 0.5 * (bottom + top)));
+        let half = shape.half_diagonal();
+        let (near, far) = (
+            (cell.flat.length() - half).max(0.0),
+            cell.flat.length() + half,
+        );
+        let radii = fixed.as_ref().map(critical_radii);
+        let mut volume = 0.0;
+        self.boundary_near(z + bottom, z + top, near, |part| {
             let piece = &part.piece;
             let sign = f64::from(part.disc_sign());
             if sign == 0.0 || piece.on_axis {
                 return;
             }
-            let low = piece.bounds.min[1].max(bottom);
-            let high = piece.bounds.max[1].min(top);
+            let low = piece.bounds.min[1].max(z + bottom);
+            let high = piece.bounds.max[1].min(z + top);
             if low >= high {
                 return;
             }
-            if piece.bounds.min[0] >= far {
-                // The disc takes the whole polygon.
-                volume.value += sign * ((high - low) * disc_area(sections, 2.0 * far));
-                return;
-            }
-            let stretch = Stretch::new(part, low, high);
-            let area = |r: f64| disc_area(sections, r);
-            let found = stretch.volume(&stretch.at_radii(&radii), tolerance, &area);
-            volume.value += sign * found.value;
-            volume.error += found.error;
+            // Beyond the voxel the disc takes the whole polygon.
+            let beyond = piece.bounds.min[0] >= far;
+            let area = |r: f64, height: f64| match &fixed {
+                Some(sections) => disc_area(sections, r),
+                None => disc_area(&cell.sections(slab, height), r),
+            };
+            volume += sign
+                * match (beyond, &radii) {
+                    (true, Some(_)) => (high - low) * area(2.0 * far, low),
+                    // The polygon's area is quadratic in z: one panel is exact.
+                    (true, None) if cell.clips.len() < 2 => {
+                        quadrature::panel(&mut |h| area(2.0 * far, h), low, high).value
+                    }
+                    (true, None) => {
+                        let whole = |h: f64| area(2.0 * far, h);
+                        quadrature::integrate(whole, low, high, cell.tolerance, 256).value
+                    }
+                    (false, Some(radii)) => {
+                        let stretch = Stretch::new(part, low, high);
+                        stretch.volume(&stretch.at_radii(radii), cell.tolerance, &area)
+                    }
+                    (false, None) => {
+                        let stretch = Stretch::new(part, low, high);
+                        stretch.volume(&stretch.at_corners(cell, slab), cell.tolerance, &area)
+                    }
+                };
         });
         volume
+    }
+}
+
+impl Cell<'_> {
+    /// Heights, within a slab and from the centre, at which a half-space's plane meets an edge.
+    fn meetings(&self, slab: usize) -> Vec<f64> {
+        let corners = &self.shape.corners;
+        let (low, high) = (self.shape.heights[slab], self.shape.heights[slab + 1]);
+        let mut heights = Vec::new();
+        for clip in self.clips.iter().filter(|c| !c.is_upright()) {
+            for [i, j] in EDGES {
+                let (a, b) = (corners[i], corners[j]);
+                let off = |p: DVec3| clip.normal.dot(p) - clip.offset;
+                let (from, to) = (off(a), off(b));
+                if (from <= 0.0) != (to <= 0.0) {
+                    let height = a.z + (b.z - a.z) * (from / (from - to));
+                    if height > low && height < high {
+                        heights.push(height);
+                    }
+                }
+            }
+        }
+        heights
+    }
+
+    /// The cross-section at height `h`, within the turn and the half-spaces.
+    fn sections(&self, slab: usize, h: f64) -> Sections {
+        let z = h - self.z;
+        let mut polygon = self.shape.polygon(slab, z, self.flat);
+        for clip in &self.clips {
+            polygon = clip.of(&polygon, z, self.flat);
+        }
+        within_turn(polygon, self.turn, self.reach)
     }
 }
 
@@ -321,8 +432,28 @@ impl<'a> Stretch<'a> {
         inner.map(|&r| parameter(self.part, 0, r)).collect()
     }
 
-    /// ∫ area(r(z)) |dz|, cut at the given parameters.
-    fn volume(&self, cuts: &[f64], tolerance: f64, area: &impl Fn(f64) -> f64) -> Integral {
+    /// Parameters at which the circle passes through a corner of the cross-section, as far as the
+    /// difference changes sign between the ends and the middle.
+    fn at_corners(&self, cell: &Cell, slab: usize) -> Cuts {
+        let mut cuts = Cuts::new();
+        for &edge in &cell.shape.slabs[slab] {
+            let off = |t: f64| {
+                let [r, h] = self.point(t);
+                (on_edge(&cell.shape.corners, edge, h - cell.z) + cell.flat).length() - r
+            };
+            let middle = 0.5 * (self.from + self.to);
+            let (a, m, b) = (off(self.from), off(middle), off(self.to));
+            for (s, t, low, high) in [(self.from, middle, a, m), (middle, self.to, m, b)] {
+                if low * high < 0.0 {
+                    cuts.push(illinois(&off, s, t, low, high));
+                }
+            }
+        }
+        cuts
+    }
+
+    /// ∫ area(r(z), z) |dz|, cut at the given parameters.
+    fn volume(&self, cuts: &[f64], tolerance: f64, area: &impl Fn(f64, f64) -> f64) -> f64 {
         let piece = &self.part.piece;
         let mut ends: Cuts = cuts
             .iter()
@@ -339,24 +470,23 @@ impl<'a> Stretch<'a> {
         let integrand = |t: f64| {
             if linear {
                 let dz = end[1] - start[1];
-                return area(start[0] + (end[0] - start[0]) * t) * dz.abs();
+                return area(start[0] + (end[0] - start[0]) * t, start[1] + dz * t) * dz.abs();
             }
             let (r, _) = bernstein::evaluate_with_derivative(r, t);
             let (z, dz) = bernstein::evaluate_with_derivative(z, t);
             let (w, dw) = bernstein::evaluate_with_derivative(w, t);
-            area(r / w + origin[0]) * ((dz * w - z * dw) / (w * w)).abs()
+            area(r / w + origin[0], z / w + origin[1]) * ((dz * w - z * dw) / (w * w)).abs()
         };
-        let mut sum = Integral::default();
-        for c in ends.windows(2).filter(|c| c[1] > c[0]) {
-            let width = c[1] - c[0];
-            let smooth = |u: f64| {
-                integrand(c[0] + width * u * u * (3.0 - 2.0 * u)) * width * 6.0 * u * (1.0 - u)
-            };
-            let one = quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256);
-            sum.value += one.value;
-            sum.error += one.error;
-        }
-        sum
+        ends.windows(2)
+            .filter(|c| c[1] > c[0])
+            .map(|c| {
+                let width = c[1] - c[0];
+                let smooth = |u: f64| {
+                    integrand(c[0] + width * u * u * (3.0 - 2.0 * u)) * width * 6.0 * u * (1.0 - u)
+                };
+                quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256).value
+            })
+            .sum()
     }
 }
 

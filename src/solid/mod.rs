@@ -18,7 +18,6 @@ mod flux;
 mod fraction;
 mod grazing;
 mod measure;
-mod oblique;
 mod panels;
 mod part;
 mod patch_fraction;

@@ -309,19 +309,10 @@ impl Revolved {
         low: f64,
         high: f64,
         near: f64,
-        each: impl FnMut(&BoundaryPiece),
-    ) {
-        let wanted = |b: &Box2| b.max[1] >= low && b.min[1] <= high && b.max[0] >= near;
-        self.boundary_where(wanted, each);
-    }
-
-    /// Calls `each` with the boundary pieces whose boxes, and the boxes around these, are wanted.
-    pub(super) fn boundary_where(
-        &self,
-        wanted: impl Fn(&Box2) -> bool,
         mut each: impl FnMut(&BoundaryPiece),
     ) {
-        self.tree.visit(&wanted, |i| {
+        let wanted = |b: &Box2| b.max[1] >= low && b.min[1] <= high && b.max[0] >= near;
+        self.tree.visit(wanted, |i| {
             let part = &self.boundary[i as usize];
             if wanted(&part.piece.bounds) {
                 each(part);

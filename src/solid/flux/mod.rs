@@ -46,8 +46,8 @@ use std::collections::BinaryHeap;
 use std::sync::LazyLock;
 use strips::{Attempt, Strips};
 
-/// Steps of refinement for one direction.
-const BUDGET: usize = 20_000;
+/// Steps of refinement for one direction: in strips, and where these do not do.
+const BUDGETS: [usize; 2] = [2_000, 10_000];
 
 /// A patch is good where its bound is this share of what is asked of all.
 const FINE: f64 = 64.0;
@@ -115,18 +115,21 @@ impl Ord for Worst {
 /// * `goal`: the error that is asked for; the result tells what is reached.
 pub(super) fn share(nets: &[Net], spaces: &[HalfSpace], goal: f64) -> Integral {
     let mut best: Option<Integral> = None;
-    let mut tried = [false; 3];
-    for direction in directions(nets, spaces) {
-        // The other way round the same planes touch.
-        if std::mem::replace(&mut tried[direction.axis], true) {
-            continue;
-        }
-        let found = direction.share(nets, spaces, goal);
-        if best.is_none_or(|b| found.error < b.error) {
-            best = Some(found);
-        }
-        if found.error <= goal {
-            break;
+    let directions = directions(nets, spaces);
+    for strips in [true, false] {
+        let mut tried = [false; 3];
+        for direction in &directions {
+            // The other way round the same planes touch.
+            if std::mem::replace(&mut tried[direction.axis], true) {
+                continue;
+            }
+            let found = direction.share(nets, spaces, goal, strips);
+            if best.is_none_or(|b| found.error < b.error) {
+                best = Some(found);
+            }
+            if found.error <= goal {
+                return found;
+            }
         }
     }
     best.unwrap_or_default()
@@ -203,10 +206,12 @@ impl Direction {
         }
     }
 
-    fn share(self, nets: &[Net], spaces: &[HalfSpace], goal: f64) -> Integral {
+    /// The share with L along this direction; without `strips` patches that several planes cut are only halved.
+    fn share(self, nets: &[Net], spaces: &[HalfSpace], goal: f64, strips: bool) -> Integral {
         let spaces: SmallVec<[HalfSpace; 8]> = spaces.iter().map(|s| self.space(s)).collect();
         let cell = Cell {
             domain: Domain::new(&spaces),
+            strips,
         };
         let fine = goal / FINE;
         let seen = |net: &&Net| self.sees(&bounds(&domain::hull(net)));
@@ -219,7 +224,7 @@ impl Direction {
         let open = leaves.iter().enumerate().filter(|l| l.1.bound > 0.0);
         let mut heap: BinaryHeap<Worst> = open.map(|(i, leaf)| worst(i, leaf)).collect();
         let mut total: f64 = leaves.iter().map(|l| l.bound).sum();
-        for step in 0..BUDGET {
+        for step in 0..BUDGETS[usize::from(!strips)] {
             if step % 64 == 63 {
                 // What differences have left of the sum's rounding.
                 total = leaves.iter().map(|l| l.bound).sum();
@@ -273,6 +278,8 @@ impl Direction {
 /// A cell that patches are looked at for.
 struct Cell {
     domain: Domain,
+    /// Whether patches are seen in strips between several planes.
+    strips: bool,
 }
 
 impl Cell {
@@ -319,30 +326,32 @@ impl Cell {
                 }
                 leaf(net, best.0, best.1, slack, (wide, 0.5))
             }
-            Kind::Open => match strips::attempt(&net, &look) {
-                Attempt::None => {
-                    let at = match look.open.as_slice() {
-                        [form] => wider(bends_of(form, &net), &hull, net.degrees),
-                        _ => apart(&look, &hull, net.degrees),
-                    };
-                    leaf(net, best.0, best.1, slack, (at, 0.5))
-                }
-                Attempt::Cut(net, at) => leaf(net, best.0, best.1, slack, (0, at)),
-                Attempt::Strips(net, graphs, strips) => {
-                    let hull = domain::hull(&net);
-                    let norms = Norms::new(&net, &hull);
-                    let bounds = norms.strips(&graphs, &strips.regions);
-                    let (rule, error) = proof::rule(&bounds, fine);
-                    // The zeros themselves are found to a rounding.
-                    #[allow(clippy::cast_precision_loss, reason = "a few")]
-                    let found = 4.0 * graphs.len() as f64 * sheets * net.slack;
-                    if error < best.1 {
-                        best = (Sum::Strips(Box::new(strips), rule), error);
+            Kind::Open => {
+                match strips::attempt(&net, &look, if self.strips { strips::MOST } else { 1 }) {
+                    Attempt::None => {
+                        let at = match look.open.as_slice() {
+                            [form] => wider(bends_of(form, &net), &hull, net.degrees),
+                            _ => apart(&look, &hull, net.degrees),
+                        };
+                        leaf(net, best.0, best.1, slack, (at, 0.5))
                     }
-                    let wide = wider(norms.bends(&net), &hull, net.degrees);
-                    leaf(net, best.0, best.1, slack + found, (wide, 0.5))
+                    Attempt::Cut(net, at) => leaf(net, best.0, best.1, slack, (0, at)),
+                    Attempt::Strips(net, graphs, strips) => {
+                        let hull = domain::hull(&net);
+                        let norms = Norms::new(&net, &hull);
+                        let bounds = norms.strips(&graphs, &strips.regions);
+                        let (rule, error) = proof::rule(&bounds, fine);
+                        // The zeros themselves are found to a rounding.
+                        #[allow(clippy::cast_precision_loss, reason = "a few")]
+                        let found = 4.0 * graphs.len() as f64 * sheets * net.slack;
+                        if error < best.1 {
+                            best = (Sum::Strips(Box::new(strips), rule), error);
+                        }
+                        let wide = wider(norms.bends(&net), &hull, net.degrees);
+                        leaf(net, best.0, best.1, slack + found, (wide, 0.5))
+                    }
                 }
-            },
+            }
         }
     }
 }

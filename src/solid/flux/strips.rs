@@ -6,7 +6,7 @@ use super::proof::Graph;
 use smallvec::SmallVec;
 
 /// Functions at most that are told apart on one patch.
-const MOST: usize = 6;
+pub(super) const MOST: usize = 6;
 
 /// Shares of a patch that are not cut off it.
 const LEAST: f64 = 1e-6;
@@ -28,8 +28,9 @@ pub(super) enum Attempt {
     Strips(Net, SmallVec<[Graph; 4]>, Strips),
 }
 
-pub(super) fn attempt(net: &Net, look: &Look) -> Attempt {
-    if look.open.len() > MOST {
+/// Sees a patch in strips, where no more than `most` functions change sign on it.
+pub(super) fn attempt(net: &Net, look: &Look, most: usize) -> Attempt {
+    if look.open.len() > most {
         return Attempt::None;
     }
     let views = [net.clone(), net.transposed()];
