@@ -83,7 +83,7 @@ fn slice(
     let mut probe = field.probe(f64::INFINITY);
     let mut colour = |i: usize, j: usize| {
         let p = grid.centre(i, j, k);
-        let distance = field.distance(&mut probe, p);
+        let distance = field.exact_distance(&mut probe, p);
         if distance <= 0.0 {
             colour::material(field.material(p))
         } else {

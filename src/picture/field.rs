@@ -158,7 +158,16 @@ impl<'a> Field<'a> {
         signed(found.distance, inside)
     }
 
-    /// The same with the cut.
+    /// Signed distance to the solid as it is without the cut.
+    pub(super) fn exact_distance(&self, probe: &mut Probe, p: DVec3) -> f64 {
+        if self.assembly.single().is_some() {
+            self.distance(probe, p)
+        } else {
+            self.assembly.signed_distance(p)
+        }
+    }
+
+    /// A lower bound with the cut.
     pub(super) fn cut_distance(&self, probe: &mut Probe, p: DVec3) -> f64 {
         let removed = self.cut.map_or(f64::NEG_INFINITY, |c| c.depth(p));
         self.distance(probe, p).max(removed)

@@ -373,7 +373,7 @@ fn values(
             let mut probe = field.probe(f64::INFINITY);
             for (i, value) in row.iter_mut().enumerate() {
                 let p = point(plane, window.at(length(i) - 0.5, length(j) - 0.5));
-                let distance = field.distance(&mut probe, p);
+                let distance = field.exact_distance(&mut probe, p);
                 let material = if distance <= 0.0 {
                     1 + u32::try_from(field.material(p)).unwrap_or(0)
                 } else {

@@ -115,6 +115,35 @@ impl DistanceSet {
     }
 }
 
+/// A point of a piece than which no point near it along the piece is nearer.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LocalFoot {
+    pub(crate) distance: f64,
+    pub(crate) at: [f64; 2],
+    /// Unit vector along the piece, away from its end where the point is one; into either direction elsewhere.
+    pub(crate) tangent: [f64; 2],
+    pub(crate) is_end: bool,
+}
+
+impl DistanceSet {
+    /// Calls `each` with the points of every piece at which the distance has a local minimum, where that is below
+    /// `limit`, and with the ends of the pieces as far as they are. Where a whole arc is as near, its middle stands for
+    /// it.
+    pub(crate) fn each_foot(&self, point: [f64; 2], limit: f64, mut each: impl FnMut(LocalFoot)) {
+        let square = limit * limit;
+        let near = |b: &Box2| b.distance_squared(point) < square;
+        self.tree.visit(near, |i| {
+            if near(&self.boxes[i as usize]) {
+                self.arcs[i as usize].each_foot(point, |foot| {
+                    if foot.distance < limit {
+                        each(foot);
+                    }
+                });
+            }
+        });
+    }
+}
+
 /// The parts of a piece that get a box each.
 fn parts(piece: &Piece) -> impl Iterator<Item = Piece> {
     let closed_form = piece.degree() == 1 || piece.circle.is_some();
@@ -238,6 +267,64 @@ impl Arc {
     }
 }
 
+impl Arc {
+    /// The ends and what local minima are between them.
+    fn each_foot(&self, point: [f64; 2], mut each: impl FnMut(LocalFoot)) {
+        let q = [point[0] - self.origin[0], point[1] - self.origin[1]];
+        let mut offer = |at: [f64; 2], tangent: [f64; 2], is_end: bool| {
+            let length = tangent[0].hypot(tangent[1]);
+            let tangent = if length > 0.0 {
+                tangent.map(|t| t / length)
+            } else {
+                [0.0, 1.0]
+            };
+            each(LocalFoot {
+                distance: square(q, at).sqrt(),
+                at: [at[0] + self.origin[0], at[1] + self.origin[1]],
+                tangent,
+                is_end,
+            });
+        };
+        let [a, b] = self.ends;
+        match &self.shape {
+            Shape::Segment {
+                direction: d,
+                length_squared,
+            } => {
+                offer(a, *d, true);
+                offer(b, d.map(|d| -d), true);
+                let s = ((q[0] - a[0]) * d[0] + (q[1] - a[1]) * d[1]) / length_squared;
+                if s > 0.0 && s < 1.0 {
+                    offer([0, 1].map(|c| a[c] + s * d[c]), *d, false);
+                }
+            }
+            Shape::Circle { centre, radius } => {
+                let [s, e] = [a, b].map(|p| [p[0] - centre[0], p[1] - centre[1]]);
+                let turn = cross(s, e).signum();
+                // Along the circle, from s to e.
+                let along = |v: [f64; 2]| [-v[1] * turn, v[0] * turn];
+                offer(a, along(s), true);
+                offer(b, along(e).map(|t| -t), true);
+                let mut v = [q[0] - centre[0], q[1] - centre[1]];
+                if v[0].hypot(v[1]) <= 1e-15 * radius {
+                    // All of the arc is as near.
+                    v = [s[0] + e[0], s[1] + e[1]];
+                }
+                if cross(s, v) * turn > 0.0 && cross(v, e) * turn > 0.0 {
+                    let off = v[0].hypot(v[1]);
+                    let at = [0, 1].map(|c| centre[c] + v[c] / off * radius);
+                    offer(at, along(v), false);
+                }
+            }
+            Shape::Rational(rational) => {
+                offer(a, rational.slope(0.0), true);
+                offer(b, rational.slope(1.0).map(|t| -t), true);
+                rational.minima(q, |t| offer(rational.at(t), rational.slope(t), false));
+            }
+        }
+    }
+}
+
 fn square(p: [f64; 2], q: [f64; 2]) -> f64 {
     let (x, y) = (p[0] - q[0], p[1] - q[1]);
     x * x + y * y
@@ -313,8 +400,17 @@ impl Rational {
         }
     }
 
-    /// Lowers `best` to the least interior minimum of the squared distance.
-    fn minimise(&self, q: [f64; 2], best: &mut Best) {
+    /// A vector along the curve.
+    fn slope(&self, t: f64) -> [f64; 2] {
+        let (w, dw) = bernstein::evaluate_with_derivative(&self.coefficients[2], t);
+        [0, 1].map(|c| {
+            let (v, dv) = bernstein::evaluate_with_derivative(&self.coefficients[c], t);
+            (dv * w - v * dw) / (w * w)
+        })
+    }
+
+    /// Half the derivative of the squared distance, times W³.
+    fn stationary(&self, q: [f64; 2]) -> Coefficients<f64> {
         /// Roundings of one coefficient: three stored numbers, two products, two differences.
         const NOISE: f64 = 4.0 * f64::EPSILON;
         let [a, b, c] = &self.stationary;
@@ -326,6 +422,38 @@ impl Rational {
             // What is below its own rounding has no sign.
             h.push(if value.abs() <= noise { 0.0 } else { value });
         }
+        h
+    }
+
+    /// Calls `each` with the parameters of all interior minima.
+    fn minima(&self, q: [f64; 2], mut each: impl FnMut(f64)) {
+        const WIDTH: f64 = 1e-14;
+        let mut work: SmallVec<[Interval; 8]> = SmallVec::new();
+        work.push((self.stationary(q), 0.0, 1.0));
+        while let Some((h, a, b)) = work.pop() {
+            match changes(&h) {
+                0 => {}
+                1 => {
+                    if rises(&h) {
+                        each(a + (b - a) * root(&h));
+                    }
+                }
+                _ => {
+                    let m = 0.5 * (a + b);
+                    each(m);
+                    if b - a > WIDTH {
+                        let (left, right) = bernstein::split(&h, 0.5);
+                        work.push((left, a, m));
+                        work.push((right, m, b));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lowers `best` to the least interior minimum of the squared distance.
+    fn minimise(&self, q: [f64; 2], best: &mut Best) {
+        let h = self.stationary(q);
         match changes(&h) {
             0 => {}
             1 => {

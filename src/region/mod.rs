@@ -52,6 +52,7 @@ pub(crate) use cells::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};
 pub(crate) use chain::Chain;
 pub(crate) use crossings::MeridianPoint;
 pub(crate) use curve::{HomogeneousPoint, beziers};
+pub(crate) use distance::LocalFoot;
 pub(crate) use field::{Extent, MeridianField};
 pub(crate) use mirror::is_mirrored;
 pub(crate) use moments::{Estimate, SectionMoments};

@@ -11,9 +11,11 @@
 //! asked alone, as sheets that faces leave are no part of the solid.
 //!
 //! * Accuracy: that of the bodies' distances, as the least and the largest of numbers err by no more than they do.
-//! * Certainty: the distance is exact where the nearest point of the body that decides is on the composite's boundary.
-//!   It surely is where no other body that could take it away changes within that distance.
+//! * Certainty: the distance is exact where the nearest point of the body that decides is on the composite's boundary;
+//!   elsewhere it is found anew ([`super::beyond`]). Where that is not known of the bodies' surfaces, it is a lower
+//!   bound, and surely exact where no other body that could take the point away changes within that distance.
 
+use super::beyond::Layer;
 use super::bits::{self, SideBits};
 use super::body::{Asked, BodySampler, BodyScratch};
 use super::radial::Writing;
@@ -47,10 +49,10 @@ pub(super) struct CompositeScratch {
 
 /// A layer of one body.
 #[derive(Debug, Default)]
-struct BodyLayer {
+pub(super) struct BodyLayer {
     inside: Vec<u64>,
     on: Vec<u64>,
-    distances: Vec<f32>,
+    pub(super) distances: Vec<f32>,
 }
 
 /// Which distances are counted.
@@ -163,9 +165,12 @@ impl Composite<'_> {
             composite: *self,
             bodies,
             inside,
-            out,
+            out: &mut *out,
         };
         writing.kernel.dispatch(job);
+        if let Some(nearest) = self.assembly.nearest() {
+            Layer::new(*self, nearest, bodies, (k, writing)).finish(writing, out);
+        }
     }
 
     /// Counts which distances of a layer are exact; `sdf` is what [`distances`](Self::distances) found.

@@ -348,7 +348,7 @@ impl<'a> LayerSampler<'a> {
             band: stored(self.band()),
             near: stored(3.0 * self.grid.spacing().max_element()),
         };
-        if self.single.is_some() {
+        if self.single.is_some() || self.assembly.nearest().is_some() {
             count_exact(limits, sdf, certainty);
         } else {
             let composite = &mut scratch.composite;

@@ -24,6 +24,7 @@
 //!   memory      stores past the caches, large pages
 //! ```
 
+mod beyond;
 mod bits;
 mod blocks;
 mod body;

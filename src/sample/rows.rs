@@ -150,12 +150,15 @@ impl LayerSampler<'_> {
             let point = self.grid.centre(i, j, k);
             let (side, inside) = (|b: usize| sides[b][i], occupancy[i] != 0);
             let measured = self.assembly.measure_distance(point, side, inside, reaches);
-            *value = stored(signed(measured.distance, inside).clamp(-band, band));
             reaches.moved(spacing.x);
+            let (mut distance, mut exact) = (measured.distance, true);
             // A clamped value says only how far the surface is at least.
-            if measured.distance < band {
-                let exact = self.assembly.is_exact(point, side, inside, measured);
-                certainty.count(exact, measured.distance <= near);
+            if distance < band && !self.assembly.is_exact(point, side, inside, measured) {
+                (distance, exact) = self.assembly.nearest_distance(point, distance);
+            }
+            *value = stored(signed(distance, inside).clamp(-band, band));
+            if distance < band {
+                certainty.count(exact, distance <= near);
             }
         }
     }

@@ -1,15 +1,18 @@
 //! Several solids composed: added, subtracted, intersected, in their order.
 //!
 //! Membership is the boolean of the solids' own memberships, regularised: the composite is the
-//! closure of its interior. Distance is exact where the nearest point of the solid that decides is
-//! on the composite's boundary, and a lower bound of it elsewhere:
+//! closure of its interior. A lower bound of the distance to its boundary is
 //!
 //! ```text
 //!   inside    depth = max over terms that hold the point of (min over factors of d)
 //!   outside   gap   = min over terms of (max over factors that leave the point out of d)
 //! ```
+//!
+//! It is the distance where the nearest point of the solid that decides is on the composite's boundary; elsewhere
+//! [`Nearest`] finds it.
 
 use super::body::Body;
+use super::nearest::Nearest;
 use super::part::{Operation, Part};
 use super::patches::Patches;
 use super::terms::{Factor, Term, terms};
@@ -17,7 +20,7 @@ use crate::math::Aabb;
 use crate::math::Side;
 use crate::patch::Preimage;
 use glam::DVec3;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Parts composed into one solid.
 #[derive(Debug, Clone)]
@@ -26,6 +29,8 @@ pub struct Assembly {
     bodies: Vec<Arc<Body>>,
     terms: Vec<Term>,
     bounds: Aabb,
+    /// Made for the first distance that needs it; `None` where it cannot be made.
+    nearest: OnceLock<Option<Arc<Nearest>>>,
 }
 
 /// What a distance was measured to.
@@ -95,6 +100,7 @@ impl Assembly {
             bodies: composed.bodies,
             terms: composed.terms,
             bounds,
+            nearest: OnceLock::new(),
         }
     }
 
@@ -292,8 +298,7 @@ impl Assembly {
         parts.filter(|p| p.operation() == Operation::Add)
     }
 
-    /// Signed distance, negative inside, in scene units; a lower bound of its size where the
-    /// distance of a composite is not exact.
+    /// Signed distance to the boundary of the composite, negative inside, in scene units.
     #[must_use]
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         self.signed_distance_with_certainty(point).0
@@ -308,8 +313,30 @@ impl Assembly {
         let inside = self.holds(side, || point);
         let mut reaches = Reaches::new(self, f64::INFINITY);
         let measured = self.measure_distance(point, side, inside, &mut reaches);
-        let certain = self.is_exact(point, side, inside, measured);
-        (signed(measured.distance, inside), certain)
+        if self.is_exact(point, side, inside, measured) {
+            return (signed(measured.distance, inside), true);
+        }
+        let (distance, certain) = self.nearest_distance(point, measured.distance);
+        (signed(distance, inside), certain)
+    }
+
+    /// The distance to the composite's boundary, where a lower bound of it is known, and whether it is exact; else the
+    /// bound is given back.
+    pub(crate) fn nearest_distance(&self, point: DVec3, least: f64) -> (f64, bool) {
+        match self.nearest() {
+            Some(nearest) => (nearest.distance(point, least), true),
+            None => (least, false),
+        }
+    }
+
+    /// The composite's boundary, where it is of several bodies and can be made of them.
+    pub(crate) fn nearest(&self) -> Option<&Nearest> {
+        let made = || {
+            let several = self.single().is_none() && !self.terms.is_empty();
+            let nearest = || Nearest::new(&self.bodies, &self.terms);
+            several.then(nearest).flatten().map(Arc::new)
+        };
+        self.nearest.get_or_init(made).as_deref()
     }
 
     /// The unsigned distance of a point whose sides are known.

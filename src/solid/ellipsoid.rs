@@ -29,6 +29,7 @@ use crate::math::tetrahedra::HalfSpace;
 use crate::math::{Aabb, Dd, Real, Side, Similarity};
 use crate::region::{Boundary, Fill, ProfileCurve, Region};
 use glam::DVec3;
+use smallvec::SmallVec;
 use std::f64::consts::{PI, TAU};
 
 /// A solid ellipsoid about the origin of its frame, its half axes along the frame's axes.
@@ -127,6 +128,27 @@ impl Ellipsoid {
             return None;
         }
         Some(self.frame.to_world(nearest(self.radii, p).1))
+    }
+
+    /// The points of the surface than which no point near them is nearer, and a vector along the normal at each: in
+    /// scene units. Those across the plane of the shorter axes of a point deep inside are two.
+    pub(super) fn local_feet(&self, point: DVec3) -> SmallVec<[(DVec3, DVec3); 2]> {
+        let p = self.frame.to_local(point).point;
+        let mut feet = SmallVec::new();
+        if !(p.abs().max_element() < 1e90) {
+            return feet;
+        }
+        let mut add = |foot: DVec3| {
+            let normal = foot / (self.radii * self.radii);
+            let turned = |i: usize| self.frame.axis(i) * normal[i];
+            let normal = turned(0) + turned(1) + turned(2);
+            feet.push((self.frame.to_world(foot), normal));
+        };
+        add(nearest(self.radii, p).1);
+        if let Some(foot) = second(self.radii, p) {
+            add(foot);
+        }
+        feet
     }
 
     pub(super) fn cuts(&self, row: &Row, cuts: &mut Cuts) {
@@ -318,6 +340,58 @@ fn nearest(radii: DVec3, point: DVec3) -> (f64, DVec3) {
             }
         })));
     (off, signs(foot, point))
+}
+
+/// The other local minimum of the distance, beyond the plane that the least axis is normal to.
+///
+/// With t = -r_m² - w the stationary points are those where Σ (r_i x_i / (r_i² + t))² = 1. That of the least w > 0, up
+/// to which the sum falls, is a minimum: the second derivatives of |x - y|² along the surface are those of
+/// 1 + t / r_i², of which one is negative, along the normal.
+fn second(radii: DVec3, point: DVec3) -> Option<DVec3> {
+    const STEPS: u32 = 200;
+    let least = (0..3).min_by(|&i, &j| radii[i].total_cmp(&radii[j]))?;
+    let squares = radii * radii;
+    let room = squares - DVec3::splat(squares[least]);
+    let others = [(least + 1) % 3, (least + 2) % 3];
+    if others.iter().any(|&i| !(room[i] > 1e-12 * squares[i])) {
+        return None;
+    }
+    let pull = radii * point.abs();
+    if pull[least] <= 1e-15 * squares[least] {
+        // In the plane: the mirror image, where the foot leaves it.
+        let mut foot = nearest(radii, point).1;
+        foot[least] = -foot[least];
+        return (foot[least].abs() > 0.0).then_some(foot);
+    }
+    let mut w = pull[least];
+    for _ in 0..STEPS {
+        let own = pull[least] / w;
+        let (mut value, mut slope) = (own * own - 1.0, -2.0 * own * own / w);
+        for i in others {
+            let rest = room[i] - w;
+            if !(rest > 0.0) {
+                return None;
+            }
+            let share = pull[i] / rest;
+            value += share * share;
+            slope += 2.0 * share * share / rest;
+        }
+        if !(slope < 0.0) {
+            return None;
+        }
+        // From the left of the root of a convex function no step goes beyond it.
+        let step = -value / slope;
+        w += step.max(0.0);
+        if step <= 2.0 * f64::EPSILON * w {
+            break;
+        }
+    }
+    let mut foot = DVec3::ZERO;
+    foot[least] = -squares[least] * point[least] / w;
+    for i in others {
+        foot[i] = squares[i] * point[i] / (room[i] - w);
+    }
+    foot.is_finite().then_some(foot)
 }
 
 fn signs(size: DVec3, sign: DVec3) -> DVec3 {

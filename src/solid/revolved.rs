@@ -236,6 +236,16 @@ impl Revolved {
         best
     }
 
+    /// What sweeps the surface, in the body's unit.
+    pub(super) fn swept(&self) -> &DistanceSet {
+        &self.surface
+    }
+
+    /// The edges of the caps, in the body's unit.
+    pub(super) fn cap_edges(&self) -> &DistanceSet {
+        &self.edges
+    }
+
     /// Whether the boxes of the pieces that sweep the surface come within `margin` of a box of the
     /// half-plane, in the body's unit.
     pub(super) fn surface_overlaps(&self, r: [f64; 2], z: [f64; 2], margin: f64) -> bool {

@@ -1,0 +1,142 @@
+//! Boxes around what of a body's surface may be on the composite's boundary, and around what may not.
+//!
+//! Each sheet is divided into tiles until a tile is all visible or all hidden: no other surface comes as near to its
+//! middle as the tile reaches, or only such as are the same surface all over the tile. Tiles along edges are divided to a
+//! share of the composite's size and count as both.
+
+use super::boxes::{Boxes, away};
+use super::sheet::Tile;
+use super::visible::{Scene, Spot};
+use crate::math::Aabb;
+use rayon::prelude::*;
+
+/// Reach of the tiles along edges, as a share of the composite's size.
+const FINE: f64 = 1.0 / 256.0;
+/// Reach of hidden tiles: boxes around larger ones would hold much that is visible.
+const COARSE: f64 = 1.0 / 32.0;
+/// Tiles looked at of all sheets together; what is left of a sheet's share is not divided.
+const MOST_TILES: usize = 1_000_000;
+
+/// One body's boxes.
+#[derive(Debug)]
+pub(super) struct Cover {
+    /// Around what may be hidden.
+    pub(super) hidden: Boxes,
+    /// Around what may be visible.
+    pub(super) visible: Boxes,
+}
+
+enum Sort {
+    Visible,
+    Hidden,
+    Either,
+}
+
+/// The covers of all bodies.
+pub(super) fn covers(scene: &Scene) -> Vec<Cover> {
+    let sheets = 0..scene.sheets.len();
+    let parts: Vec<[Vec<Aabb>; 2]> = sheets.into_par_iter().map(|i| divide(scene, i)).collect();
+    let of_body = |b: usize| {
+        let mut all = [Vec::new(), Vec::new()];
+        for (sheet, part) in scene.sheets.iter().zip(&parts) {
+            if sheet.body == b {
+                for k in 0..2 {
+                    all[k].extend_from_slice(&part[k]);
+                }
+            }
+        }
+        let [hidden, visible] = all.map(Boxes::new);
+        Cover { hidden, visible }
+    };
+    (0..scene.bodies.len()).map(of_body).collect()
+}
+
+/// The boxes of the tiles of a sheet that may be hidden, and of those that may be visible.
+fn divide(scene: &Scene, index: usize) -> [Vec<Aabb>; 2] {
+    let sheet = &scene.sheets[index];
+    let fine = FINE * scene.size;
+    let share = (MOST_TILES / scene.sheets.len()).min(MOST_TILES / 20);
+    let mut out = [Vec::new(), Vec::new()];
+    let mut work = std::collections::VecDeque::from([Tile::ALL]);
+    let mut seen = 0;
+    while let Some(tile) = work.pop_front() {
+        seen += 1;
+        let sides = sheet.reach(&tile);
+        let reach = sides[0].hypot(sides[1]);
+        let sort = sort(scene, index, &tile, reach);
+        let large = match sort {
+            Sort::Visible => f64::INFINITY,
+            Sort::Hidden => COARSE * scene.size,
+            Sort::Either => fine,
+        };
+        if reach > large && seen < share {
+            work.extend(tile.halves(usize::from(sides[1] > sides[0])));
+            continue;
+        }
+        let bounds = sheet.tile_box(&tile);
+        let room = 1e-9 * scene.size;
+        let bounds = Aabb {
+            min: bounds.min - room,
+            max: bounds.max + room,
+        };
+        if !matches!(sort, Sort::Visible) {
+            out[0].push(bounds);
+        }
+        if !matches!(sort, Sort::Hidden) {
+            out[1].push(bounds);
+        }
+    }
+    out
+}
+
+fn sort(scene: &Scene, index: usize, tile: &Tile, reach: f64) -> Sort {
+    let sheet = &scene.sheets[index];
+    let x = sheet.point(tile.middle());
+    if sheet.margin(x) < -reach {
+        // Beyond a cap's region there is no surface.
+        return Sort::Hidden;
+    }
+    let reach = reach + scene.hair();
+    for (b, body) in scene.bodies.iter().enumerate() {
+        if b == sheet.body || away(&body.bounds(), x) > reach {
+            continue;
+        }
+        if scene.distance(b, x, reach) < reach && !same_all_over(scene, index, b, x, reach) {
+            return Sort::Either;
+        }
+    }
+    let inside = sheet.margin(x) > 4.0 * scene.hair();
+    let Some(normal) = sheet.value(x).1.try_normalize().filter(|_| inside) else {
+        return Sort::Either;
+    };
+    let spot = Spot {
+        point: x,
+        normal,
+        body: sheet.body,
+    };
+    if scene.is_visible(spot) {
+        Sort::Visible
+    } else {
+        Sort::Hidden
+    }
+}
+
+/// Whether what of a body comes near is the sheet's own surface, further than the reach from its borders.
+fn same_all_over(scene: &Scene, index: usize, body: usize, x: glam::DVec3, reach: f64) -> bool {
+    let mut found = false;
+    for (k, other) in scene.sheets.iter().enumerate() {
+        if other.body != body || away(&other.bounds, x) >= reach {
+            continue;
+        }
+        let margin = other.margin(x);
+        let near = other.value(x).0.abs() < reach && margin > -reach;
+        if !near {
+            continue;
+        }
+        if !scene.same[index].contains(&k) || margin <= reach {
+            return false;
+        }
+        found = true;
+    }
+    found
+}

@@ -1,0 +1,236 @@
+//! The distance to the boundary of a composite, whatever bodies it is of.
+//!
+//! The nearest point of the boundary is one of
+//!
+//! ```text
+//!   a foot    within a face of a body, on its edge or corner: a local minimum of the distance to the body
+//!   an edge   where faces of two bodies cross, or the end of such an edge, where a third comes in
+//! ```
+//!
+//! Edges are traced once: every crossing of two sheets is found by dividing one of them, followed as polynomial arcs,
+//! and clipped to what is an edge of the composite. What is left for a point is the nearest arc of a tree, and those feet
+//! that are nearer, the nearest first, until one is on the boundary ([`visible`]).
+//!
+//! * Accuracy: 1e-11 of the size where faces cross at an angle. Faces that touch without crossing have no edge there;
+//!   each face's own feet are all that is near.
+//! * Bounds: the tiles, arcs and parts of one pair of sheets are counted; where they are too many there is no answer.
+//! * Source: the conditions of first and second order of constrained minima; exclusion by Lipschitz bounds as in
+//!   Patrikalakis, Maekawa, *Shape Interrogation for Computer Aided Design and Manufacturing* (2002), chapters 4 and 5.
+
+mod arc;
+mod boxes;
+mod clip;
+mod cover;
+mod feet;
+mod sheet;
+mod trace;
+mod visible;
+
+use super::body::Body;
+use super::terms::Term;
+use arc::ArcTree;
+use cover::Cover;
+use feet::View;
+use glam::DVec3;
+use rayon::prelude::*;
+use sheet::Sheet;
+use smallvec::SmallVec;
+use std::sync::{Arc, OnceLock};
+use trace::Crossing;
+use visible::{Scene, Spot};
+
+/// Sizes whose squares are far from the ends of f64.
+const SIZES: std::ops::Range<f64> = 1e-100..1e100;
+/// From so many sizes away all of the composite is as far, but for rounding.
+const FAR: f64 = 1e20;
+/// Arcs of one composite.
+const MOST_ARCS: usize = 200_000;
+
+/// The boundary of a composite, ready for distances.
+#[derive(Debug)]
+pub(crate) struct Nearest {
+    /// The middle of the composite: all else is about it.
+    middle: DVec3,
+    scene: Scene,
+    edges: ArcTree,
+    /// One for each body; made for the first grid.
+    covers: OnceLock<Vec<Cover>>,
+}
+
+impl Nearest {
+    /// `None` where a surface is not made of known sheets, or the edges are too many.
+    pub(super) fn new(bodies: &[Arc<Body>], terms: &[Term]) -> Option<Self> {
+        let around = bodies.iter().map(|b| b.bounds());
+        let around = around.reduce(|a, b| a.union(&b))?;
+        let middle = 0.5 * (around.min + around.max);
+        let size = around.longest_side();
+        if !(middle.is_finite() && SIZES.contains(&size)) {
+            return None;
+        }
+        let bodies: Vec<Arc<Body>> = bodies
+            .iter()
+            .map(|b| Arc::new(b.translated(-middle)))
+            .collect();
+        let mut sheets = Vec::new();
+        for (index, body) in bodies.iter().enumerate() {
+            sheet::sheets(index, body, &mut sheets)?;
+        }
+        let mut scene = Scene {
+            bodies,
+            terms: terms.to_vec(),
+            same: vec![Vec::new(); sheets.len()],
+            sheets,
+            size,
+        };
+        let pairs = pairs(&scene);
+        for &[i, j] in &pairs {
+            let [a, b] = [i, j].map(|i| &scene.sheets[i]);
+            let touch = 4.0 * scene.touch();
+            if a.coincides(b, touch) || b.coincides(a, touch) {
+                scene.same[i].push(j);
+                scene.same[j].push(i);
+            }
+        }
+        let edges = ArcTree::new(edges(&scene, &pairs)?);
+        Some(Self {
+            middle,
+            scene,
+            edges,
+            covers: OnceLock::new(),
+        })
+    }
+
+    /// The unsigned distance to the boundary, where a lower bound is known; infinite where there is none.
+    pub(super) fn distance(&self, point: DVec3, least: f64) -> f64 {
+        let p = point - self.middle;
+        if !(p.abs().max_element() <= FAR * self.scene.size) {
+            return least;
+        }
+        let limit = self.edges.distance(p, f64::INFINITY);
+        self.faces(p, limit, |_, _| true, |_| true).max(least)
+    }
+
+    /// The distance to what the bodies of which `asked` is so have on the boundary, or the limit where that is less.
+    /// Covers leave out most of what is hidden.
+    pub(crate) fn distance_below(
+        &self,
+        point: DVec3,
+        limit: f64,
+        asked: impl Fn(usize) -> bool,
+    ) -> f64 {
+        let p = point - self.middle;
+        let covers = self.covers();
+        let limit = self.edges.distance(p, limit);
+        self.faces(
+            p,
+            limit,
+            |b, limit| asked(b) && covers[b].visible.meet(p, limit),
+            |spot| {
+                let cover = &covers[spot.body];
+                cover.visible.meet(spot.point, 1e-9 * self.scene.size)
+            },
+        )
+    }
+
+    /// Whether the nearest point of a body's surface may be hidden from a point within `reach` of a place.
+    ///
+    /// With f the place's own foot, a point q of the surface is nearer to x than f only where
+    /// `|c - q|² - |c - f|² <= 2 |x - c| |f - q|`, as the difference of the squares is linear in x.
+    pub(crate) fn may_hide_foot(&self, body: usize, place: DVec3, reach: f64) -> bool {
+        let hidden = &self.covers()[body].hidden;
+        if hidden.is_empty() {
+            return false;
+        }
+        let c = place - self.middle;
+        let body = &self.scene.bodies[body];
+        let Some(foot) = body.foot(c, body.contains(c)) else {
+            return true;
+        };
+        let square = c.distance_squared(foot) * (1.0 + 1e-9);
+        hidden.any(|b| {
+            let aside = boxes::away(b, foot) + b.sides().length();
+            boxes::square_away(b, c) - square <= 2.0 * reach * aside
+        })
+    }
+
+    /// Whether a part of a body's surface that may be hidden is within `far` of a point.
+    #[inline]
+    pub(crate) fn is_hidden_within(&self, body: usize, point: DVec3, far: f64) -> bool {
+        let cover = &self.covers()[body];
+        cover.hidden.meet(point - self.middle, far)
+    }
+
+    fn covers(&self) -> &[Cover] {
+        self.covers.get_or_init(|| cover::covers(&self.scene))
+    }
+
+    /// The distance to the nearest visible foot below a limit, of the bodies and the spots that are asked.
+    fn faces(
+        &self,
+        p: DVec3,
+        limit: f64,
+        body_asked: impl Fn(usize, f64) -> bool,
+        spot_asked: impl Fn(&Spot) -> bool,
+    ) -> f64 {
+        let scene = &self.scene;
+        let mut all: SmallVec<[(f64, Spot); 32]> = SmallVec::new();
+        for (index, body) in scene.bodies.iter().enumerate() {
+            if boxes::away(&body.bounds(), p) < limit && body_asked(index, limit) {
+                let view = View {
+                    point: p,
+                    limit,
+                    size: scene.size,
+                };
+                feet::feet(index, body, view, &mut |distance, spot| {
+                    all.push((distance, spot));
+                });
+            }
+        }
+        // Few are looked at before one is visible.
+        while let Some((at, _)) = (all.iter().enumerate()).min_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
+            let (distance, spot) = all.swap_remove(at);
+            if spot_asked(&spot) && scene.is_visible(spot) {
+                return distance;
+            }
+        }
+        limit
+    }
+}
+
+/// Sheets of different bodies whose boxes meet.
+fn pairs(scene: &Scene) -> Vec<[usize; 2]> {
+    let sheets = &scene.sheets;
+    let room = scene.touch();
+    let apart = |a: &Sheet, b: &Sheet| {
+        let (a, b) = (&a.bounds, &b.bounds);
+        (a.min - room).cmpgt(b.max).any() || (b.min - room).cmpgt(a.max).any()
+    };
+    let all = (0..sheets.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
+    all.filter(|&[i, j]| {
+        let (a, b) = (&sheets[i], &sheets[j]);
+        a.body != b.body && !apart(a, b)
+    })
+    .collect()
+}
+
+/// The edges of the composite where bodies cross.
+fn edges(scene: &Scene, pairs: &[[usize; 2]]) -> Option<Vec<arc::Arc>> {
+    let of_pair = |&[i, j]: &[usize; 2]| {
+        if scene.same[i].contains(&j) {
+            return Some(Vec::new());
+        }
+        let sides = |s: &Sheet| (s.bounds.max - s.bounds.min).length();
+        let (a, b) = (&scene.sheets[i], &scene.sheets[j]);
+        let sheets = if sides(a) <= sides(b) { [a, b] } else { [b, a] };
+        let crossing = Crossing {
+            sheets,
+            size: scene.size,
+        };
+        let mut edges = Vec::new();
+        clip::edges(scene, &crossing, &crossing.curves()?, &mut edges);
+        Some(edges)
+    };
+    let found: Option<Vec<Vec<arc::Arc>>> = pairs.par_iter().map(of_pair).collect();
+    let arcs: Vec<arc::Arc> = found?.into_iter().flatten().collect();
+    (arcs.len() <= MOST_ARCS).then_some(arcs)
+}
