@@ -448,7 +448,8 @@ mod tests {
                 loops.iter().map(of).sum()
             };
             for k in 0..400_u32 {
-                let p = [k % 20, k / 20].map(|v| (f64::from(v) + 0.417) / 19.0);
+                // On no chord.
+                let p = [f64::from(k % 20) + 0.417, f64::from(k / 20) + 0.283].map(|v| v / 19.0);
                 let (mut covered, mut layers) = (0, 0);
                 for &t in &cap.triangles {
                     let [a, b, c] = t.map(|i| corners[i as usize]);
