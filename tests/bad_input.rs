@@ -312,7 +312,7 @@ fn solids_and_grids_are_checked() {
     for (text, marks) in [
         ("angle = 0", &["s.toml:11:9", "found 0", "360"][..]),
         ("angle = 361", &["s.toml:11:9", "361", "360"]),
-        ("angle = -90", &["s.toml:11:9", "-90"]),
+        ("angle = -361", &["s.toml:11:9", "-361"]),
         ("angle = nan", &["s.toml:11:9", "nan"]),
         (
             "axis = { direction = [0, 0, 0] }",

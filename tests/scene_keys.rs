@@ -236,7 +236,7 @@ fn a_band_and_its_image_are_united() {
         ] {
             for side in [1.0, -1.0] {
                 let (r, out) = (side * r, side * out_r);
-                if r >= 0.0 && r <= 2.0 && !inside((r + 1e-9 * out).abs(), z + 1e-9 * out_z) {
+                if (0.0..=2.0).contains(&r) && !inside((r + 1e-9 * out).abs(), z + 1e-9 * out_z) {
                     edge.push([r, z]);
                 }
             }

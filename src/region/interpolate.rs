@@ -256,7 +256,7 @@ impl Banded {
 }
 
 fn closed(points: &[[f64; 2]], degree: usize) -> Result<Vec<Bezier>, String> {
-    if degree % 2 == 0 {
+    if degree.is_multiple_of(2) {
         return Err(format!(
             "is closed and has degree {degree}; a closed interpolating curve has an odd one"
         ));

@@ -244,7 +244,7 @@ fn interpolate(fields: &Fields<'_>, points: Vec<PointModel>) -> Result<CurveKind
         let found = format!("{} points", points.len());
         return refused("points", found, "at least 3 points for closed = true");
     }
-    if closed && degree % 2 == 0 {
+    if closed && degree.is_multiple_of(2) {
         let wanted = "an odd degree for closed = true";
         return refused("degree", degree.to_string(), wanted);
     }

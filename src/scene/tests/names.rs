@@ -15,9 +15,15 @@ fn unknown_keys_are_refused_with_the_nearest() {
          output, materials, profiles, solid, reference",
     );
     refuses(
+        &small("radius = 1", "radii = [1, 1]"),
+        "vase.toml:5:1: profiles.ring.curves[0].radii: found unknown key `radii`, wanted one of kind, \
+         reverse, center, radius; did you mean `radius`?",
+    );
+    // A key that is there already was not meant.
+    refuses(
         &small("radius = 1", "radius = 1\nradii = [1, 1]"),
         "vase.toml:6:1: profiles.ring.curves[0].radii: found unknown key `radii`, wanted one of kind, \
-         reverse, center, radius; did you mean `radius`?",
+         reverse, center, radius",
     );
     refuses(
         &small("kind = \"circle\"", "kind = \"cirle\""),

@@ -65,8 +65,8 @@ fn sets_that_cannot_be_are_refused_by_name() {
         ),
         (
             "solid.0.angle=",
-            "--set solid.0.angle=: solid[0].angle: found a string, wanted an angle greater than 0 and at \
-             most 360",
+            "--set solid.0.angle=: solid[0].angle: found a string, wanted an angle other than 0, of at \
+             most 360 either way",
         ),
     ] {
         assert_eq!(message(with_sets(SMALL, &[set])), wanted);

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn solids_are_checked() {
     let with = |rest: &str| format!("{SMALL}{rest}\n");
-    for bad in ["0", "361", "-90", "nan"] {
+    for bad in ["0", "361", "-361", "nan"] {
         refuses(
             &with(&format!("angle = {bad}")),
             &format!(
