@@ -85,9 +85,9 @@ fn the_space_asked_for_is_what_is_taken() {
     let t = scratch();
     let out = below(&t, "out");
     for (grid, channels) in [
-        ("32", "occupancy"),
+        ("64", "occupancy"),
         ("40,20,50", "occupancy,fraction,sdf"),
-        ("7,90,30", "sdf"),
+        ("20,90,30", "sdf"),
     ] {
         let arguments = [
             "voxelize",
@@ -175,7 +175,7 @@ fn dense_texts_take_the_memory_of_their_values() {
         )
         .expect("written");
         // 6 MiB: twenty times that, the pages of the program and of its threads' stacks.
-        let ended = limited("ulimit -v 300000", &["measure", &file, "--threads", "1"]);
+        let ended = limited("ulimit -v 400000", &["measure", &file, "--threads", "1"]);
         let err = String::from_utf8_lossy(&ended.stderr);
         assert_eq!(ended.status.code(), Some(2), "{element}: {err}");
         assert!(err.contains(wanted), "{element}: {err}");
