@@ -672,7 +672,7 @@ fn mutations(seeds: std::ops::Range<u64>) {
         }
     }
     AT[0].store(u64::MAX, Ordering::SeqCst);
-    println!(
+    eprintln!(
         "{count} mutations in {:.0?}, the slowest {} ms (seed {}), peak {} KiB; failed: {failed:?}",
         begun.elapsed(),
         slowest.0,
