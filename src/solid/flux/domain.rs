@@ -46,10 +46,10 @@ pub(super) struct Look {
     pub(super) most: f64,
     /// The linear function nearest to L where no side cuts the patch, and how far it is off at most.
     pub(super) nearest: Option<(Form, f64)>,
-    /// Functions that change sign: between their zeros L is linear.
+    /// Functions that change sign, one for each place of zeros: between them L is linear.
     pub(super) open: SmallVec<[Form; 8]>,
-    /// How many of these are sides; the first.
-    sides: usize,
+    /// Sides that cut the patch.
+    sides: SmallVec<[Form; 8]>,
     /// What may be the lowest top and the highest floor.
     tops: Forms,
     floors: Forms,
@@ -60,9 +60,25 @@ pub(super) struct Look {
 type Forms = SmallVec<[Form; 4]>;
 
 impl Look {
+    /// Leaves one of functions that have their zeros in common, as where a flat patch passes through an edge of the
+    /// cell: they could not be told apart however small the patch.
+    fn join(&mut self, hull: &Hull, slack: f64) {
+        let mut left: SmallVec<[Form; 8]> = SmallVec::new();
+        for form in &self.open {
+            match left
+                .iter()
+                .find_map(|kept| in_common(kept, form, hull, slack))
+            {
+                Some(room) => self.slack = self.slack.max(room),
+                None => left.push(*form),
+            }
+        }
+        self.open = left;
+    }
+
     /// L about a point of the patch, where no function is 0; `None` where it is 0.
     pub(super) fn form_at(&self, p: &[f64; 3]) -> Option<Form> {
-        if self.open[..self.sides].iter().any(|s| value(s, p) > 0.0) {
+        if self.sides.iter().any(|s| value(s, p) > 0.0) {
             return None;
         }
         let of = |form: &&Form| value(form, p);
@@ -88,6 +104,17 @@ pub(super) fn range(form: &Form, hull: &Hull) -> [f64; 2] {
 
 pub(super) fn value(form: &Form, p: &[f64; 3]) -> f64 {
     form[0] * p[0] + form[1] * p[1] + form[2] * p[2] + form[3]
+}
+
+/// Whether one form is a multiple of another on a patch, but for the rounding that is returned.
+fn in_common(kept: &Form, form: &Form, hull: &Hull, slack: f64) -> Option<f64> {
+    let largest =
+        |a: &&[f64; 3], b: &&[f64; 3]| value(kept, a).abs().total_cmp(&value(kept, b).abs());
+    let at = hull.iter().max_by(largest)?;
+    let times = value(form, at) / value(kept, at);
+    let room = rounding(form, slack) + times.abs() * rounding(kept, slack);
+    let alike = |p: &[f64; 3]| (value(form, p) - times * value(kept, p)).abs() <= room;
+    (times.is_finite() && hull.iter().all(alike)).then_some(room)
 }
 
 /// Adds a plane that is not there yet.
@@ -155,7 +182,7 @@ impl Domain {
             most: 0.0,
             nearest: None,
             open: SmallVec::new(),
-            sides: 0,
+            sides: SmallVec::new(),
             tops: Forms::new(),
             floors: Forms::new(),
             slack: 0.0,
@@ -170,12 +197,12 @@ impl Domain {
                 return look;
             }
             if high > room {
-                look.open.push(*side);
+                look.sides.push(*side);
             } else if high > -room {
                 look.slack = look.slack.max(room);
             }
         }
-        look.sides = look.open.len();
+        look.open.clone_from(&look.sides);
         let tops = lowest(&self.tops, hull, slack, 1.0, &mut look.slack);
         let floors = lowest(&self.floors, hull, slack, -1.0, &mut look.slack);
         // A length is at most 1, and at most each difference.
@@ -203,9 +230,10 @@ impl Domain {
                 look.open.extend(list[..i].iter().map(|b| minus(a, b)));
             }
         }
-        if look.sides == 0 && !look.open.is_empty() {
+        if look.sides.is_empty() && !look.open.is_empty() {
             look.nearest = nearest(&tops, &floors, hull);
         }
+        look.join(hull, slack);
         look.kind = if look.open.is_empty() {
             Kind::Whole(minus(&tops[0], &floors[0]))
         } else {
