@@ -310,6 +310,9 @@ fn signed(scene: &Scene, p: [f64; 3]) -> f64 {
     distance
 }
 
+/// A point and its signed distance.
+type Row = ([f64; 3], f64);
+
 /// Where faces of two solids are one in the other's surface no sheet is left between.
 #[test]
 fn no_sheet_where_faces_join() {
@@ -325,7 +328,7 @@ fn no_sheet_where_faces_join() {
         format!("[[solid]]\nkind = 'torus'\nmajor = 2\nminor = 1\nstart = {start}\nangle = 90\n")
     };
     let quarters = [0, 90, 180, 270].map(quarter).concat();
-    let rows: [(&str, &[([f64; 3], f64)]); 3] = [
+    let rows: [(&str, &[Row]); 3] = [
         (
             elbow,
             &[
