@@ -14,12 +14,14 @@
 //! (r - r₀)^{3/2} at the cuts, which the substitution t = 3u² - 2u³ makes smooth. Gauss-Kronrod
 //! panels are halved until the error estimate is below what the caller asks.
 //!
-//! For a polygon that changes with z the meetings with its corners are sought too, but cuts only
-//! save work: what they leave is found by the halving.
+//! For a polygon that changes with z, all planes that bound it (sides of the voxel, half-spaces, caps) are lines that
+//! move evenly with z. So where two of them meet runs along a straight line, and that it passes a third one, or that the
+//! circle passes it or touches a line, are zeros of polynomials in z or in the piece's parameter: all are cuts. Without
+//! them the two rules of a panel may agree on a wrong number, as a kink need not lie where their points see it.
 
 use super::revolved::Revolved;
 use super::turn::Turn;
-use crate::math::bernstein;
+use crate::math::bernstein::{self, Coefficients};
 use crate::math::disc::{self, Polygon};
 use crate::math::tetrahedra::HalfSpace;
 use crate::math::{Real, Similarity, quadrature};
@@ -42,6 +44,8 @@ pub(crate) struct CellShape {
     heights: Vec<f64>,
     /// For each slab between heights, the edges in counter-clockwise order.
     slabs: Vec<Vec<[usize; 2]>>,
+    /// For each slab the voxel's sides that bound the polygon, from its centre; in the order of the edges.
+    sides: Vec<Vec<HalfSpace>>,
     /// Whether the polygon is the same at every height.
     upright: bool,
     volume: f64,
@@ -98,12 +102,15 @@ impl CellShape {
                 edges.into_iter().map(|e| e.0).collect()
             })
             .collect();
+        let slabs: Vec<Vec<[usize; 2]>> = slabs;
+        let sides = slabs.iter().map(|edges| sides(&corners, edges)).collect();
         let volume = axes[0].cross(axes[1]).dot(axes[2]).abs();
         let upright = heights.len() == 2;
         Self {
             corners,
             heights,
             slabs,
+            sides,
             upright,
             volume,
         }
@@ -121,6 +128,22 @@ impl CellShape {
             .map(|&e| on_edge(&self.corners, e, z) + centre)
             .collect()
     }
+}
+
+/// The planes through neighbouring edges of a cross-section.
+fn sides(corners: &[DVec3; 8], edges: &[[usize; 2]]) -> Vec<HalfSpace> {
+    let next = |i: usize| edges[if i + 1 == edges.len() { 0 } else { i + 1 }];
+    let pairs = edges.iter().enumerate().map(|(i, &e)| (e, next(i)));
+    let plane = |([a, b], [c, d]): ([usize; 2], [usize; 2])| {
+        let start = corners[a];
+        // Edges of one side may share a corner.
+        let across = if c == a || c == b { d } else { c };
+        let normal = (corners[b] - start).cross(corners[across] - start);
+        let normal = normal.normalize_or_zero();
+        let offset = normal.dot(start);
+        HalfSpace { normal, offset }
+    };
+    pairs.map(plane).collect()
 }
 
 fn on_edge(corners: &[DVec3; 8], [i, j]: [usize; 2], z: f64) -> DVec2 {
@@ -199,6 +222,55 @@ fn disc_area(sections: &Sections, r: f64) -> f64 {
         .iter()
         .map(|(p, sign)| sign * disc::polygon_disc_area(p, r))
         .sum()
+}
+
+/// A line of a cross-section that moves evenly with its height: `normal · x + tilt h = offset`, x from the axis and h
+/// from the voxel's centre.
+#[derive(Debug, Clone, Copy)]
+struct SectionLine {
+    normal: DVec2,
+    tilt: f64,
+    offset: f64,
+    /// Whether it is in a side of the voxel.
+    is_side: bool,
+}
+
+type Lines = SmallVec<[SectionLine; 12]>;
+
+/// How many of the lines are in sides of the voxel.
+fn sides_of(lines: &Lines) -> usize {
+    lines.iter().filter(|l| l.is_side).count()
+}
+
+/// Where two lines meet: at `at + slope h`.
+struct Vertex {
+    at: DVec2,
+    slope: DVec2,
+}
+
+impl SectionLine {
+    /// Where two lines meet; `None` where they are parallel.
+    fn vertex(&self, other: &Self) -> Option<Vertex> {
+        let (a, b) = (self.normal, other.normal);
+        let det = a.perp_dot(b);
+        if det.abs() <= 1e-12 * a.length() * b.length() {
+            return None;
+        }
+        let at = |own: f64, others: f64| (b.perp() * -own + a.perp() * others) / det;
+        Some(Vertex {
+            at: at(self.offset, other.offset),
+            slope: at(-self.tilt, -other.tilt),
+        })
+    }
+}
+
+impl Vertex {
+    /// The height at which it passes a line; `None` where it runs along it.
+    fn height_on(&self, line: &SectionLine) -> Option<f64> {
+        let rate = line.normal.dot(self.slope) + line.tilt;
+        let height = (line.offset - line.normal.dot(self.at)) / rate;
+        height.is_finite().then_some(height)
+    }
 }
 
 /// One voxel in a solid's frame.
@@ -306,6 +378,10 @@ impl Revolved {
             cell.flat.length() + half,
         );
         let radii = fixed.as_ref().map(critical_radii);
+        let lines = match fixed {
+            Some(_) => Lines::new(),
+            None => cell.lines(slab),
+        };
         let mut volume = 0.0;
         self.boundary_near(z + bottom, z + top, near, |part| {
             let piece = &part.piece;
@@ -341,7 +417,7 @@ impl Revolved {
                     }
                     (false, None) => {
                         let stretch = Stretch::new(part, low, high);
-                        stretch.volume(&stretch.at_corners(cell, slab), cell.tolerance, &area)
+                        stretch.volume(&stretch.at_lines(&lines, cell.z), cell.tolerance, &area)
                     }
                 };
         });
@@ -350,21 +426,60 @@ impl Revolved {
 }
 
 impl Cell<'_> {
-    /// Heights, within a slab and from the centre, at which a half-space's plane meets an edge.
+    /// The lines that may bound the cross-sections of a slab; neighbouring sides of the voxel first.
+    fn lines(&self, slab: usize) -> Lines {
+        let from_axis = |space: &HalfSpace| {
+            let normal = DVec2::new(space.normal.x, space.normal.y);
+            SectionLine {
+                normal,
+                tilt: space.normal.z,
+                offset: space.offset + normal.dot(self.flat),
+                is_side: false,
+            }
+        };
+        let mut lines = Lines::new();
+        for side in &self.shape.sides[slab] {
+            let line = from_axis(side);
+            lines.push(SectionLine {
+                is_side: true,
+                ..line
+            });
+        }
+        lines.extend(self.clips.iter().map(|c| {
+            from_axis(&HalfSpace {
+                normal: c.normal,
+                offset: c.offset,
+            })
+        }));
+        if let (Turn::Partial(wedge), Reach::Cut) = (self.turn, self.reach) {
+            lines.extend(wedge.directions().iter().map(|d| SectionLine {
+                normal: d.perp(),
+                tilt: 0.0,
+                offset: 0.0,
+                is_side: false,
+            }));
+        }
+        lines
+    }
+
+    /// Heights, within a slab and from the centre, at which three of the lines meet. Sides of the voxel alone meet at
+    /// its corners, between the slabs.
     fn meetings(&self, slab: usize) -> Vec<f64> {
-        let corners = &self.shape.corners;
         let (low, high) = (self.shape.heights[slab], self.shape.heights[slab + 1]);
         let mut heights = Vec::new();
-        for clip in self.clips.iter().filter(|c| !c.is_upright()) {
-            for [i, j] in EDGES {
-                let (a, b) = (corners[i], corners[j]);
-                let off = |p: DVec3| clip.normal.dot(p) - clip.offset;
-                let (from, to) = (off(a), off(b));
-                if (from <= 0.0) != (to <= 0.0) {
-                    let height = a.z + (b.z - a.z) * (from / (from - to));
-                    if height > low && height < high {
-                        heights.push(height);
-                    }
+        if self.shape.upright && self.clips.iter().all(Clip::is_upright) {
+            return heights;
+        }
+        let lines = self.lines(slab);
+        for (i, a) in lines.iter().enumerate().filter(|l| !l.1.is_side) {
+            // Among those that are no sides, each three once.
+            let others = lines.iter().enumerate();
+            let others = others.filter(|(k, l)| l.is_side || *k < i);
+            let others: SmallVec<[&SectionLine; 12]> = others.map(|o| o.1).collect();
+            for (k, b) in others.iter().enumerate() {
+                for c in &others[..k] {
+                    let height = b.vertex(c).and_then(|v| v.height_on(a));
+                    heights.extend(height.filter(|h| *h > low && *h < high));
                 }
             }
         }
@@ -432,21 +547,45 @@ impl<'a> Stretch<'a> {
         inner.map(|&r| parameter(self.part, 0, r)).collect()
     }
 
-    /// Parameters at which the circle passes through a corner of the cross-section, as far as the
-    /// difference changes sign between the ends and the middle.
-    fn at_corners(&self, cell: &Cell, slab: usize) -> Cuts {
+    /// Parameters at which the circle touches one of the lines or passes a point in which two meet; `z` is the height of
+    /// the voxel's centre.
+    fn at_lines(&self, lines: &Lines, z: f64) -> Cuts {
+        let [r, h, w] = &self.part.piece.twin.coefficients;
+        let origin = self.part.piece.twin.origin;
+        let plus = |a: &[f64], b: &[f64], times: f64| -> Coefficients<f64> {
+            a.iter().zip(b).map(|(a, b)| a + times * b).collect()
+        };
+        // Numerators of the radius and of the height above the voxel's centre.
+        let (r, h) = (plus(r, w, origin[0]), plus(h, w, origin[1] - z));
         let mut cuts = Cuts::new();
-        for &edge in &cell.shape.slabs[slab] {
-            let off = |t: f64| {
-                let [r, h] = self.point(t);
-                (on_edge(&cell.shape.corners, edge, h - cell.z) + cell.flat).length() - r
-            };
-            let middle = 0.5 * (self.from + self.to);
-            let (a, m, b) = (off(self.from), off(middle), off(self.to));
-            for (s, t, low, high) in [(self.from, middle, a, m), (middle, self.to, m, b)] {
-                if low * high < 0.0 {
-                    cuts.push(illinois(&off, s, t, low, high));
+        let mut zeros = |numerator: &[f64]| {
+            let part = bernstein::restrict(numerator, self.from, self.to);
+            sign_changes(&part, self.from, self.to, 0, &mut cuts);
+        };
+        let even = |constant: f64, slope: f64| -> Coefficients<f64> {
+            (w.iter().zip(&h))
+                .map(|(w, h)| constant * w + slope * h)
+                .collect()
+        };
+        for (i, a) in lines.iter().enumerate() {
+            let length = a.normal.length();
+            let off = even(a.offset, -a.tilt);
+            zeros(&plus(&off, &r, length));
+            zeros(&plus(&off, &r, -length));
+            for (k, b) in lines[..i].iter().enumerate() {
+                // Sides that are no neighbours meet beyond the voxel.
+                let apart =
+                    a.is_side && b.is_side && k + 1 != i && !(k == 0 && i + 1 == sides_of(lines));
+                if apart {
+                    continue;
                 }
+                let Some(vertex) = a.vertex(b) else {
+                    continue;
+                };
+                let [x, y] = [0, 1].map(|c| even(vertex.at[c], vertex.slope[c]));
+                let squares = [&x, &y, &r].map(|c| bernstein::product(c, c));
+                let sum = bernstein::sum(&squares[0], &squares[1]);
+                zeros(&bernstein::difference(&sum, &squares[2]));
             }
         }
         cuts
@@ -487,6 +626,36 @@ impl<'a> Stretch<'a> {
                 quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256).value
             })
             .sum()
+    }
+}
+
+/// Adds the parameters between `from` and `to` at which a polynomial with these coefficients there changes its sign;
+/// where two may be too near to each other to be told apart, a place between.
+fn sign_changes(c: &[f64], from: f64, to: f64, depth: u32, cuts: &mut Cuts) {
+    /// Zeros nearer to each other than 2^-30 of the stretch bound no panel worth cutting.
+    const DEPTH: u32 = 30;
+    let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
+    let mut last = None;
+    let changes = signs
+        .filter(|sign| last.replace(*sign).is_some_and(|l| l != *sign))
+        .count();
+    if changes == 0 {
+        return;
+    }
+    let middle = 0.5 * (from + to);
+    let (first, end) = (c[0], c[c.len() - 1]);
+    if changes == 1 && first * end < 0.0 {
+        let at = illinois(&|t| bernstein::evaluate(c, t), 0.0, 1.0, first, end);
+        cuts.push(from + (to - from) * at);
+    } else if depth == DEPTH {
+        cuts.push(middle);
+    } else {
+        let (below, above) = bernstein::split(c, 0.5);
+        sign_changes(&below, from, middle, depth + 1, cuts);
+        if above[0] == 0.0 {
+            cuts.push(middle);
+        }
+        sign_changes(&above, middle, to, depth + 1, cuts);
     }
 }
 

@@ -20,6 +20,10 @@ pub(super) struct Strips {
 }
 
 /// What comes of trying to see a patch in strips.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "each is taken apart where it is made"
+)]
 pub(super) enum Attempt {
     /// Nothing is known.
     None,
