@@ -145,13 +145,12 @@ fn examine(case: &Case, p: DVec3, found: &mut Found) {
         ));
     } else if touching || perhaps.is_none() || least < most - bound {
         found.open += 1;
-    } else if certain {
+    } else {
+        // A lower bound that is short of the distance is not one.
         let truth = Estimate {
             value: most,
             error: 0.0,
         };
         found.hold(&what, sdf.abs(), truth, bound);
-    } else {
-        found.open += 1;
     }
 }
