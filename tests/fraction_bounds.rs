@@ -74,3 +74,55 @@ fn every_voxel_of_a_cylinder_whose_axis_is_in_the_lattices_planes() {
     let sum: f64 = found.iter().map(|f| f64::from(*f)).sum::<f64>() * h.powi(3);
     assert!((sum - 4.5 * PI).abs() < 1e-7 * 4.5 * PI, "{sum}");
 }
+
+/// A voxel of a wedge about a slanted axis, into which a cap comes between the heights of its corners. The right value is
+/// from chords along x, integrated over y and z.
+#[test]
+fn a_voxel_that_a_cap_about_a_slanted_axis_enters_between_its_corners() {
+    let scene = Scene::parse(
+        r#"schema = 1
+        [[solid]]
+        kind = "cylinder"
+        radius = 1.2
+        height = 1.1
+        angle = 218
+        start = 256
+        axis = { direction = [-4, 0, -3] }"#,
+    )
+    .expect("a wedge");
+    let grid = GridSpec::new([18; 3], DVec3::splat(-1.8), DVec3::splat(0.2)).expect("a grid");
+    let found = fractions(&scene, &grid);
+    let voxel = f64::from(found[5 + 18 * (5 + 18 * 8)]);
+    assert!((voxel - 0.337_276_23).abs() < 1e-7, "{voxel}");
+    // r² h / 2 times the angle.
+    let volume = 0.5 * 1.2 * 1.2 * 1.1 * 218_f64.to_radians();
+    let sum: f64 = found.iter().map(|f| f64::from(*f)).sum::<f64>() * 0.2_f64.powi(3);
+    assert!((sum - volume).abs() < 2e-8 * volume, "{sum} for {volume}");
+}
+
+/// Caps at 45 degrees pass through edges of voxels, where two planes meet them in one line.
+#[test]
+fn a_volume_whose_cap_passes_through_edges_of_voxels() {
+    let scene = Scene::parse(
+        r#"schema = 1
+        [profiles.side]
+        boundary = "to-axis"
+        curves = [{ kind = "polyline", points = [[1.5, 0], [0, 2]] }]
+        [[solid]]
+        kind = "volume"
+        construct = "curve-ruled"
+        profile = "side"
+        axis = { origin = [1, -3, 2], direction = [0, 0, -1] }
+        angle = 45"#,
+    )
+    .expect("an eighth of a cone");
+    let origin = DVec3::new(-1.5, -5.5, -1.5);
+    let grid = GridSpec::new([11; 3], origin, DVec3::splat(0.5)).expect("a grid");
+    let found = fractions(&scene, &grid);
+    // By sections normal to the axis: a polygon within a disc in closed form, integrated along the axis.
+    let voxel = f64::from(found[6 + 11 * (3 + 11 * 6)]);
+    assert!((voxel - 0.453_821_961_592).abs() < 1e-6, "{voxel}");
+    let volume = PI * 1.5 * 1.5 * 2.0 / 24.0;
+    let sum: f64 = found.iter().map(|f| f64::from(*f)).sum::<f64>() * 0.125;
+    assert!((sum - volume).abs() < 1e-7 * volume, "{sum} for {volume}");
+}

@@ -16,7 +16,9 @@ use crate::io::stack::{
 };
 use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
-use crate::sample::{Certainty, Channel, LayerBuffers, LayerSampler, Selection, Tally};
+use crate::sample::{
+    Certainty, Channel, FRACTION_PROMISE, LayerBuffers, LayerSampler, Loose, Selection, Tally,
+};
 use crate::scene::{
     ChannelModel, ChannelName, CompressionName, FormatName, PARAMETERS, Scene, nearest,
 };
@@ -99,6 +101,9 @@ pub(super) fn run(
         options,
     )?;
     let (sample, write, tally) = stream(&sampler, &plan, &writer, console)?;
+    if let Some(warning) = said_of_fractions(&tally) {
+        console.warn(&warning);
+    }
     let drawn = Instant::now();
     if arguments.preview {
         preview(&scene, &plan, &writer)?;
@@ -120,7 +125,7 @@ pub(super) fn run(
         total: start.elapsed().as_secs_f64(),
     };
     console.result(
-        &document(&scene, &plan, Some(&manifest), Some(&seconds)),
+        &document(&scene, &plan, Some(&manifest), Some(&tally), Some(&seconds)),
         &report(&scene, arguments, &manifest, &seconds),
     )?;
     Ok(ExitCode::SUCCESS)
@@ -509,11 +514,23 @@ fn said_of_volume(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-fn warnings(scene: &Scene, plan: &Plan) -> Vec<String> {
+/// What is to be said of fractions that are not as near as is promised.
+fn said_of_fractions(tally: &Tally) -> Option<String> {
+    let Loose { voxels, bound } = tally.loose;
+    (voxels > 0).then(|| {
+        format!(
+            "fraction: {voxels} voxels are known to within {bound:.1e} only, not {FRACTION_PROMISE:e}: surfaces touch their \
+             sides, or nearly coincide in them; a grid that is moved a little may do better"
+        )
+    })
+}
+
+fn warnings(scene: &Scene, plan: &Plan, tally: Option<&Tally>) -> Vec<String> {
     let volume = said_of_volume(scene).map(str::to_owned);
     let said = scene.warnings().iter().cloned();
     said.chain(scene.grid_warning(&plan.grid))
         .chain(volume)
+        .chain(tally.and_then(said_of_fractions))
         .collect()
 }
 
@@ -595,7 +612,7 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         volume_exact_error: scene.volume_beside_sampling().map(|v| v.error),
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
-        warnings: warnings(scene, plan),
+        warnings: warnings(scene, plan, Some(tally)),
         material_volumes: material_volumes(scene, plan, tally),
         certainty: if plan.selection.sdf {
             certainty(&tally.certainty)
@@ -611,6 +628,7 @@ fn document(
     scene: &Scene,
     plan: &Plan,
     manifest: Option<&Manifest>,
+    tally: Option<&Tally>,
     seconds: Option<&Seconds>,
 ) -> Value {
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
@@ -635,7 +653,7 @@ fn document(
         "volume_exact_error": scene.volume_beside_sampling().map(|v| v.error),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": memory::peak(),
-        "warnings": warnings(scene, plan),
+        "warnings": warnings(scene, plan, tally),
     })
 }
 
@@ -663,7 +681,7 @@ fn dry_run(
         output::bytes(plan.memory_bytes()),
         plan.workers,
     );
-    console.result(&document(scene, plan, None, Some(&seconds)), &text)?;
+    console.result(&document(scene, plan, None, None, Some(&seconds)), &text)?;
     Ok(ExitCode::SUCCESS)
 }
 

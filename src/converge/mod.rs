@@ -22,7 +22,7 @@ use crate::{Error, sample};
 use glam::DVec3;
 
 /// What a fraction may be off by, where a surface passes through its voxel.
-pub const FRACTION_BOUND: f64 = 1e-6;
+pub const FRACTION_BOUND: f64 = sample::FRACTION_PROMISE;
 
 /// Errors at one resolution.
 #[derive(Debug, Clone, Copy, PartialEq)]

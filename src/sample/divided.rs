@@ -13,6 +13,7 @@
 //! more. Surfaces that coincide, or are each other's other side, count as one.
 
 use super::fraction::{Share, open_terms, reach};
+use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::{HalfSpace, box_volume_within};
 use crate::solid::{Assembly, Body, Factor, TOLERANCE, Term};
 use glam::DVec3;
@@ -92,6 +93,7 @@ impl Voxel<'_> {
         let tolerance = self.tolerance(sides);
         self.body(b)
             .fraction_within(&shape, centre, spaces, tolerance)
+            .value
     }
 
     fn cell(&self, centre: DVec3, sides: DVec3) -> Cell {
@@ -359,7 +361,7 @@ fn bodies_of(terms: &[Term]) -> Vec<usize> {
 }
 
 /// The share of a voxel inside a union of terms.
-pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3) -> f64 {
+pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: DVec3) -> Integral {
     let voxel = Voxel {
         assembly,
         terms,
@@ -388,7 +390,12 @@ pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: D
     }
     let cells = heap.into_sorted_vec();
     let inside: f64 = cells.iter().map(|c| voxel.inside(c)).sum();
-    (inside / voxel.volume).clamp(0.0, 1.0)
+    let left: f64 = cells.iter().map(|c| c.doubt).sum();
+    Integral {
+        value: (inside / voxel.volume).clamp(0.0, 1.0),
+        // What is in doubt counts half.
+        error: 0.5 * left / voxel.volume,
+    }
 }
 
 /// Cuts a voxel at the flat faces normal to a grid axis, where faces of two bodies may coincide

@@ -5,6 +5,7 @@
 //! touch is divided; see the `divided` module.
 
 use super::divided;
+use super::tally::Loose;
 use crate::grid::GridSpec;
 use crate::math::Side;
 use crate::solid::{Assembly, Factor, TOLERANCE, Term, VoxelShape};
@@ -32,7 +33,7 @@ impl FractionSampler {
         }
     }
 
-    /// Fills one row and returns the sum of its fractions.
+    /// Fills one row and returns the sum of its fractions; counts those that are not as near as is promised.
     pub(super) fn row(
         &self,
         assembly: &Assembly,
@@ -40,6 +41,7 @@ impl FractionSampler {
         [j, k]: [usize; 2],
         sides: &[Vec<Side>],
         out: &mut [f32],
+        loose: &mut Loose,
     ) -> f64 {
         let bodies = assembly.bodies();
         let step = grid.spacing().x;
@@ -79,9 +81,15 @@ impl FractionSampler {
                         let one = term.factors[0];
                         let shape = &self.shapes[one.body];
                         let share = bodies[one.body].fraction_within(shape, centre, &[], TOLERANCE);
+                        loose.count(share.error);
+                        let share = share.value;
                         if one.complement { 1.0 - share } else { share }
                     }
-                    several => divided::share(assembly, several, centre, self.sides),
+                    several => {
+                        let share = divided::share(assembly, several, centre, self.sides);
+                        loose.count(share.error);
+                        share.value
+                    }
                 },
             };
             sum += share;

@@ -52,5 +52,5 @@ mod wedge;
 
 pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
-pub use tally::{Certainty, Tally};
+pub use tally::{Certainty, FRACTION_PROMISE, Loose, Tally};
 pub use volume::{filled, fraction, material, occupancy, occupancy_bits, signed_distance};

@@ -61,6 +61,7 @@ impl LayerSampler<'_> {
                     [j, k],
                     &scratch.sides,
                     &mut out.fraction[range],
+                    &mut out.tally.loose,
                 );
             }
         }

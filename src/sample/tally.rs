@@ -3,12 +3,36 @@
 use std::collections::BTreeMap;
 
 /// Counts over voxels.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tally {
     /// How exact the distances are.
     pub certainty: Certainty,
     /// Voxels of each material id, those of none left out.
     pub materials: BTreeMap<u32, u64>,
+    /// Fractions that are not known as well as is promised.
+    pub loose: Loose,
+}
+
+/// Error of a fraction, in voxels, up to which nothing is said.
+pub const FRACTION_PROMISE: f64 = 1e-6;
+
+/// Fractions whose bound is above [`FRACTION_PROMISE`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Loose {
+    /// How many there are.
+    pub voxels: u64,
+    /// The largest bound, a share of the voxel.
+    pub bound: f64,
+}
+
+impl Loose {
+    pub(super) fn count(&mut self, bound: f64) {
+        // A bound that just meets it is a sum of many.
+        if bound > FRACTION_PROMISE * (1.0 + 1e-6) {
+            self.voxels += 1;
+            self.bound = self.bound.max(bound);
+        }
+    }
 }
 
 /// How many distances, those clamped to the band left out, are exact and how many lower bounds.
@@ -32,6 +56,8 @@ impl Tally {
         a.lower_bound += b.lower_bound;
         a.exact_near += b.exact_near;
         a.lower_bound_near += b.lower_bound_near;
+        self.loose.voxels += other.loose.voxels;
+        self.loose.bound = self.loose.bound.max(other.loose.bound);
         for (&material, &voxels) in &other.materials {
             *self.materials.entry(material).or_default() += voxels;
         }

@@ -154,26 +154,33 @@ impl Body {
 
     /// The share of the voxel centred on `centre` that lies in the solid and in all the half-spaces,
     /// which are given from the voxel's centre; each stretch of a surface within an estimated error
-    /// of `tolerance`.
+    /// of `tolerance`. For rational patches with the bound that is reached.
     pub(crate) fn fraction_within(
         &self,
         voxel: &VoxelShape,
         centre: DVec3,
         spaces: &[HalfSpace],
         tolerance: f64,
-    ) -> f64 {
-        match (self, &voxel.sections) {
+    ) -> Integral {
+        let value = match (self, &voxel.sections) {
             (Self::Revolved(b), Some(shape)) => b.fraction_within(shape, centre, spaces, tolerance),
             (Self::Ellipsoid(b), Some(shape)) => {
                 b.fraction_within(shape, centre, spaces, tolerance)
             }
             (Self::Block(b), _) => b.fraction_within(voxel.sides, centre, spaces),
-            (Self::Patches(b), _) => b
-                .fraction_within(voxel.sides, centre, spaces, tolerance)
-                .value
-                .clamp(0.0, 1.0),
+            (Self::Patches(b), _) => {
+                let share = b.fraction_within(voxel.sides, centre, spaces, tolerance);
+                return Integral {
+                    value: share.value.clamp(0.0, 1.0),
+                    error: share.error,
+                };
+            }
             // A shape is made by the body that uses it.
             _ => 0.0,
+        };
+        Integral {
+            value,
+            error: tolerance,
         }
     }
 
