@@ -236,13 +236,15 @@ impl Scene {
 
     /// The same within the work that a run that samples waits for, computed once. The work is counted, not timed:
     /// equal scenes have equal answers.
-    pub(crate) fn volume_beside_sampling(&self) -> Option<Integral> {
+    #[must_use]
+    pub fn volume_beside_sampling(&self) -> Option<Integral> {
         let volume = || Self::volume_of(&self.assembly);
         *self.volume_beside_sampling.get_or_init(volume)
     }
 
     /// The volume of a composite within that work.
-    pub(crate) fn volume_of(assembly: &Assembly) -> Option<Integral> {
+    #[must_use]
+    pub fn volume_of(assembly: &Assembly) -> Option<Integral> {
         let volume = assembly.moments_within(BESIDE_SAMPLING)?.volume;
         // Where the work ended before the estimates were good.
         let known = volume.error <= POOR * volume.value || volume.value == 0.0;
@@ -250,7 +252,8 @@ impl Scene {
     }
 
     /// Whether nothing is left of the solids, as far as that is known.
-    pub(crate) fn is_known_empty(&self) -> bool {
+    #[must_use]
+    pub fn is_known_empty(&self) -> bool {
         self.assembly.is_empty()
             || self
                 .volume_beside_sampling()
