@@ -1,6 +1,6 @@
 //! Triangles of a flat cap.
 //!
-//! A cap is what the loops of an [`Outline`](super::outline::Outline) enclose. Its triangles use
+//! A cap is what the loops of an [`Outline`] enclose. Its triangles use
 //! the loops' own corners, so that the cap meets the turned surface edge for edge: a constrained
 //! Delaunay triangulation with exact predicates, each face of it taken as often as the loops wind
 //! about it.

@@ -1,5 +1,5 @@
 //! The share of a voxel, less what half-spaces take, that a solid of rational patches fills: the surface integral of
-//! [`flux`](super::flux) over the outer faces.
+//! [`flux`] over the outer faces.
 
 use super::flux::{self, Place};
 use super::patches::Patches;
