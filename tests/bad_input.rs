@@ -331,10 +331,7 @@ fn solids_and_grids_are_checked() {
             &["s.toml:11:", "step"],
         ),
         ("place = [{}]", &["s.toml:11:", "step"]),
-        (
-            "place = [{ mirror = [1, 0, 0] }]",
-            &["s.toml:11:", "mirror"],
-        ),
+        ("place = [{ shear = [1, 0, 0] }]", &["s.toml:11:", "shear"]),
         (
             "place = [{ rotate = { axis = [0, 0, 0], degrees = 3 } }]",
             &["s.toml:11:", "not zero"],

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use support::{
-    Stack, below, command, names_in, query, read_npy, run, run_within, scratch, shipped,
-    shipped_names,
+    Stack, below, command, interruptible_command, names_in, query, read_npy, run, run_within,
+    scratch, shipped, shipped_names,
 };
 use voxlathe::io::exr::{Attribute, SampleKind};
 
@@ -407,7 +407,7 @@ fn a_signal_ends_the_run_and_leaves_nothing() {
     for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
         let t = scratch();
         let out = below(&t, "deep/out");
-        let mut child = command()
+        let mut child = interruptible_command()
             .args([
                 "voxelize",
                 &shipped("goblet"),

@@ -14,7 +14,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
-use support::{below, command, names_in, run, scratch, shipped, write_npy};
+use support::{below, interruptible_command, names_in, run, scratch, shipped, write_npy};
 use voxlathe::io::{Manifest, verify_stack};
 
 fn number(name: &str, default: u64) -> u64 {
@@ -41,7 +41,7 @@ impl Random {
 
 /// Starts the command with its temporary files in `place`.
 fn start(place: &Path, arguments: &[String]) -> Child {
-    command()
+    interruptible_command()
         .args(arguments)
         .env("TMPDIR", place)
         .stdin(Stdio::null())
@@ -270,7 +270,7 @@ fn every_command_ends_within_a_second_of_a_signal() {
         for round in 0..number("VOXLATHE_MOMENTS", 6).div_ceil(3) {
             let signals = [Signal::TERM, Signal::INT, Signal::HUP, Signal::XCPU];
             let signal = signals[usize::try_from(round).expect("a small number") % 4];
-            let mut child = command()
+            let mut child = interruptible_command()
                 .args(arguments)
                 .env("TMPDIR", t.path())
                 .stdin(Stdio::piped())

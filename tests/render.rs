@@ -627,8 +627,10 @@ fn previews_belong_to_the_stack() {
     fs::write(preview("preview.png"), b"other").expect("a file is written");
     let info = run(&["info", &out, "--json"]).exits(1).json();
     assert_eq!(info["altered"], serde_json::json!(["preview.png"]));
-    // The same again gives the same; without the flag both are gone.
+    // An edited file is not replaced. Moved away, the same again gives the same; without the flag both are gone.
     let again: Vec<&str> = with.iter().copied().chain(["--force"]).collect();
+    run(&again).exits(2);
+    fs::remove_file(preview("preview.png")).expect("the edited file is moved away");
     run(&again).exits(0);
     assert_eq!(fs::read(preview("preview.png")).expect("a preview"), good);
     let without: Vec<&str> = args.iter().copied().chain(["--force"]).collect();

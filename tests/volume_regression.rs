@@ -70,12 +70,17 @@ fn a_chain_with_a_gap_is_refused_as_a_profile_is() {
                 .err()
                 .unwrap_or_else(|| panic!("{construct} {curves}"));
             assert!(error.contains(said), "{error}");
-            assert_eq!(
-                error,
-                turned
-                    .expect_err("refused too")
-                    .replace("revolve", "volume")
-            );
+            // What crosses the axis may be cut or mirrored where it is turned, and a volume may not.
+            let told = |text: &str| text.split(';').next().map(str::to_owned);
+            let turned = turned
+                .expect_err("refused too")
+                .replace("revolve", "volume");
+            if said.starts_with("r = ") {
+                assert_eq!(told(&error), told(&turned));
+                assert!(!error.contains("across"), "{error}");
+            } else {
+                assert_eq!(error, turned);
+            }
         }
     }
 }

@@ -482,6 +482,7 @@ pub(super) mod tests {
                 "volume_occupancy",
                 "volume_fraction",
                 "volume_exact",
+                "volume_exact_error",
                 "solids",
                 "materials",
                 "warnings",

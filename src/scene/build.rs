@@ -23,8 +23,8 @@ use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-/// Work of the composite's volume that a run that samples waits for: about a tenth of a second.
-const BESIDE_SAMPLING: u64 = 250_000;
+/// Work of the composite's volume that a run that samples waits for: some tenths of a second.
+const BESIDE_SAMPLING: u64 = 800_000;
 /// An error relative to the volume above which it is not told.
 const POOR: f64 = 1e-6;
 

@@ -26,8 +26,10 @@ pub(super) enum Path {
     Face { line: Arc<FaceLine>, off: f64 },
 }
 
-/// Half width of a stretch below which a parabola is trusted.
-const TRUST: f64 = 1e-4;
+/// Half width of a stretch below which a parabola is trusted. Beside an edge in which two faces meet the distance has a
+/// kink that three values need not show, and two crossings so near to each other may be lost: what they bound is of the
+/// order of this squared.
+const TRUST: f64 = 1e-6;
 /// Half width down to which stretches are halved: two crossings nearer to each other than this are
 /// taken for none.
 const FLOOR: f64 = 1e-9;

@@ -47,6 +47,16 @@ pub(crate) fn command() -> Command {
     Command::new(env!("CARGO_BIN_EXE_voxlathe"))
 }
 
+/// The command as a terminal starts it: a shell's background jobs, and what they start, ignore SIGINT, and the program
+/// leaves a signal ignored that its caller ignores.
+#[allow(dead_code, reason = "not every test sends signals")]
+pub(crate) fn interruptible_command() -> Command {
+    let mut command = Command::new("env");
+    command.arg("--default-signal=INT,TERM,HUP,XCPU");
+    command.arg(env!("CARGO_BIN_EXE_voxlathe"));
+    command
+}
+
 /// Runs the command; it must end within `limit`.
 pub(crate) fn run_within(limit: Duration, input: &str, arguments: &[&str]) -> Run {
     // Files, not pipes: long messages must not block the command.

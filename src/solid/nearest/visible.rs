@@ -134,7 +134,17 @@ impl Scene {
     /// Whether the composite's boundary passes a spot.
     pub(super) fn is_visible(&self, spot: Spot) -> bool {
         let around = self.around(spot.point, &[spot.body]);
-        self.differs(&around, &spot) || around.met && self.differs_aside(&around, &spot)
+        if !around.met {
+            // Nothing else is there: even the tip of a crack that is thinner than a hair counts.
+            let with = |own: Side| {
+                self.holds(|b| match around.near[b] {
+                    Near::Far(side) => side,
+                    Near::Here => own,
+                })
+            };
+            return with(Side::Inside) != with(Side::Outside);
+        }
+        self.differs(&around, &spot) || self.differs_aside(&around, &spot)
     }
 
     fn differs(&self, around: &Around, spot: &Spot) -> bool {
