@@ -267,11 +267,15 @@ impl Faces {
             by: usize::MAX,
         };
         let mut doubt = 0.0;
+        // What edges may be off by: crossings at which nothing changes move none.
+        let (mut moved, mut since) = (0.0, 0.0);
+        let mut before: Option<f64> = None;
         for cut in cuts.iter().chain([&end]) {
             let to = cut.place;
             // Between the crossings of the two paths beside a point nothing is lost.
             if !(to - from > 1e-14 * (b - a)) {
                 signature.add(0.0, 0.0, cut.by);
+                since += cut.doubt;
                 continue;
             }
             let m = 0.5 * (from + to);
@@ -281,6 +285,11 @@ impl Faces {
                 sign = 0.0;
             }
             signature.add(to - from - UNSURE * (doubt + cut.doubt), sign, cut.by);
+            #[allow(clippy::float_cmp, reason = "signs")]
+            if before != Some(sign) {
+                moved += since;
+            }
+            (before, since) = (Some(sign), cut.doubt);
             doubt = cut.doubt;
             match &mut stretch {
                 Some((range, same)) if *same == sign => range[1] = to,
@@ -293,7 +302,7 @@ impl Faces {
         }
         emit(stretch);
         Seen {
-            doubt: cuts.iter().map(|c| c.doubt).sum::<f64>() * rule.path.speed(),
+            doubt: (moved + since) * rule.path.speed(),
             signature: signature.number(),
         }
     }
