@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use support::{
-    Stack, below, command, interruptible_command, names_in, query, read_npy, run, run_within,
-    scratch, shipped, shipped_names,
+    Stack, below, interruptible_command, names_in, query, read_npy, run, run_within, scratch,
+    shipped, shipped_names,
 };
 use voxlathe::io::exr::{Attribute, SampleKind};
 
