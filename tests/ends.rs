@@ -246,7 +246,7 @@ fn long_runs(place: &Path) -> Vec<Vec<String>> {
         ],
         &["query", &tori, "--points", &many, "-o", &table],
         &[
-            "render", &tori, "-o", &picture, "--width", "9000", "--slice", cut,
+            "render", &tori, "-o", &picture, "--width", "8000", "--slice", cut,
         ],
         &["bench", &goblet, "--resolution", "500"],
     ];

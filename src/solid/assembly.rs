@@ -324,7 +324,15 @@ impl Assembly {
     /// bound is given back.
     pub(crate) fn nearest_distance(&self, point: DVec3, least: f64) -> (f64, bool) {
         match self.nearest() {
-            Some(nearest) => (nearest.distance(point, least), true),
+            Some(nearest) => {
+                let distance = nearest.distance(point, least);
+                // Where none of the boundary is found, as where a solid is thinner than faces are told apart.
+                if distance.is_finite() {
+                    (distance, true)
+                } else {
+                    (least, false)
+                }
+            }
             None => (least, false),
         }
     }

@@ -29,7 +29,7 @@ pub(super) enum Path {
 /// Half width of a stretch below which a parabola is trusted. Beside an edge in which two faces meet the distance has a
 /// kink that three values need not show, and two crossings so near to each other may be lost: what they bound is of the
 /// order of this squared.
-const TRUST: f64 = 1e-6;
+const TRUST: f64 = 1e-5;
 /// Half width down to which stretches are halved: two crossings nearer to each other than this are
 /// taken for none.
 const FLOOR: f64 = 1e-9;
