@@ -160,8 +160,7 @@ fn check(
     let estimate = &total["error_estimate"];
     let scale = wanted.volume.max(f64::MIN_POSITIVE);
     let mut one = |what: &str, error: f64, claimed: f64, scale: f64| {
-        // Ten thousand times the error, or 1e-10 where surfaces touch.
-        let most = 1e4 * error.max(1e-14 * scale);
+        let most = 1e4 * error.max(1e-15 * scale);
         eprintln!(
             "{name:44} {what:9} off by {:.1e}, claimed {:.1e}",
             error / scale,

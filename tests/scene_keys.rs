@@ -97,13 +97,13 @@ fn same(a: &Scene, b: &Scene, image: impl Fn(DVec3) -> DVec3, what: &str) {
     let [m, n] = [a, b].map(|s| s.measures().expect("measured"));
     let bound = m.error_estimate.volume + n.error_estimate.volume;
     assert!(
-        (m.volume - n.volume).abs() <= bound + 1e-11 * m.volume,
+        (m.volume - n.volume).abs() <= bound + 1e-13 * m.volume,
         "{what}: {} {}",
         m.volume,
         n.volume
     );
     let bound = m.error_estimate.area + n.error_estimate.area;
-    assert!((m.area - n.area).abs() <= bound + 1e-9 * m.area, "{what}");
+    assert!((m.area - n.area).abs() <= bound + 1e-13 * m.area, "{what}");
     if m.error_estimate.volume > 1e-9 * m.volume {
         return;
     }

@@ -186,8 +186,7 @@ fn boxes_of_patches_with_faces_in_one_plane() {
                 &text,
                 [volume * scale.powi(3), 0.0],
                 [area * scale.powi(2), 0.0],
-                // Where faces of patches coincide in part the estimate is coarse; the value is not, and `check` holds it.
-                1e-7,
+                1e-9,
             );
         }
     }

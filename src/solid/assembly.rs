@@ -323,18 +323,8 @@ impl Assembly {
     /// The distance to the composite's boundary, where a lower bound of it is known, and whether it is exact; else the
     /// bound is given back.
     pub(crate) fn nearest_distance(&self, point: DVec3, least: f64) -> (f64, bool) {
-        match self.nearest() {
-            Some(nearest) => {
-                let distance = nearest.distance(point, least);
-                // Where none of the boundary is found, as where a solid is thinner than faces are told apart.
-                if distance.is_finite() {
-                    (distance, true)
-                } else {
-                    (least, false)
-                }
-            }
-            None => (least, false),
-        }
+        let found = self.nearest().and_then(|n| n.distance(point, least));
+        found.map_or((least, false), |distance| (distance, true))
     }
 
     /// The composite's boundary, where it is of several bodies and can be made of them.

@@ -165,7 +165,12 @@ fn about(bodies: &[Arc<Body>], terms: &[Term], centre: DVec3) -> (Vec<Arc<Body>>
 /// The sums with their errors.
 fn totals(panels: &[Panel], faces: &Faces) -> [Integral; QUANTITIES] {
     std::array::from_fn(|k| {
-        panels.iter().fold(Integral::default(), |sum, p| Integral {
+        let joints = panels.windows(2).map(|w| w[0].joint(&w[1], k, faces));
+        let start = Integral {
+            value: 0.0,
+            error: joints.sum(),
+        };
+        panels.iter().fold(start, |sum, p| Integral {
             value: sum.value + p.integrals[k].value,
             error: sum.error + p.integrals[k].error + p.noise(k, faces),
         })

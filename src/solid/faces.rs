@@ -152,6 +152,17 @@ impl Faces {
         self.reach
     }
 
+    /// How far, in a sheet's parameter, an edge along a line may be from where the lines see it.
+    pub(super) fn uncertain(&self, sheet: usize, t: f64) -> f64 {
+        let Sheet { body, patch, .. } = self.sheets[sheet];
+        let pace = self.bodies[body].pace(patch, t);
+        if pace > 0.0 {
+            4.0 * self.hair / pace
+        } else {
+            0.0
+        }
+    }
+
     fn holds(&self, point: DVec3) -> bool {
         self.terms.iter().any(|term| {
             let mut factors = term.factors.iter();

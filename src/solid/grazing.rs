@@ -53,12 +53,12 @@ pub(super) struct Crossing {
 
 impl Polynomial {
     /// The polynomial through the values of `f` over `middle ± half`, which are known to within `rounding`; `None`
-    /// where they are no polynomial, or exceed `most`.
+    /// where they are no polynomial, unless that is nowhere above `low`, or exceed `most`.
     pub(super) fn new(
         f: &impl Fn(f64) -> f64,
         middle: f64,
         half: f64,
-        rounding: f64,
+        [rounding, low]: [f64; 2],
         most: f64,
     ) -> Option<Self> {
         let mut values = [0.0; DEGREE + 1];
@@ -79,13 +79,14 @@ impl Polynomial {
         });
         let last = coefficients[DEGREE - 1].abs() + coefficients[DEGREE].abs();
         let largest = coefficients.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-        (last <= (DECAY * largest).max(rounding)).then_some(Self {
+        let made = Self {
             middle,
             half,
             coefficients,
             doubt: SAFETY * last + 2.0 * rounding,
             ends: [values[DEGREE], values[0]],
-        })
+        };
+        (last <= (DECAY * largest).max(rounding) || made.is_within(low)).then_some(made)
     }
 
     fn at(&self, x: f64) -> f64 {
@@ -203,7 +204,7 @@ mod tests {
     #[test]
     fn roots_of_what_is_a_polynomial_and_no_others() {
         let f = |s: f64| 1e-9 * (s.sin() - 0.3);
-        let made = Polynomial::new(&f, 0.4, 0.8, 1e-16, 1e-3).expect("smooth");
+        let made = Polynomial::new(&f, 0.4, 0.8, [1e-16, 0.0], 1e-3).expect("smooth");
         let changes = made.changes().expect("clear");
         assert_eq!(changes.len(), 1);
         let (crossing, _) = made.polished(&f, changes[0], 1e-24);
@@ -213,19 +214,19 @@ mod tests {
         assert!((root - 0.3_f64.asin()).abs() < 1e-4, "{root}");
         assert!(made.is_within(2e-9) && !made.is_within(1e-10));
         // A kink, and what is large.
-        assert!(Polynomial::new(&|s: f64| (s - 0.1).abs(), 0.0, 1.0, 1e-16, 2.0).is_none());
-        assert!(Polynomial::new(&f, 0.4, 0.8, 1e-16, 1e-12).is_none());
+        assert!(Polynomial::new(&|s: f64| (s - 0.1).abs(), 0.0, 1.0, [1e-16, 0.0], 2.0).is_none());
+        assert!(Polynomial::new(&f, 0.4, 0.8, [1e-16, 0.0], 1e-12).is_none());
         // It touches 0, or nearly.
         let touches = |s: f64| 1.0 - s.cos() - 1e-9;
-        let made = Polynomial::new(&touches, 0.0, 1.0, 1e-16, 2.0).expect("smooth");
+        let made = Polynomial::new(&touches, 0.0, 1.0, [1e-16, 0.0], 2.0).expect("smooth");
         assert!(made.changes().is_none());
         // Twice within less than the places are apart.
         let dips = |s: f64| 1e-5 - (s - 0.012).cos() + 1.0 - 2e-5;
-        let made = Polynomial::new(&dips, 0.0, 1.0, 1e-16, 2.0).expect("smooth");
+        let made = Polynomial::new(&dips, 0.0, 1.0, [1e-16, 0.0], 2.0).expect("smooth");
         assert!(made.changes().is_none());
         // Nothing but rounding.
         let noise = |s: f64| 1e-17 * (1e5 * s).sin();
-        let made = Polynomial::new(&noise, 0.0, 1.0, 1e-16, 1e-3).expect("below rounding");
+        let made = Polynomial::new(&noise, 0.0, 1.0, [1e-16, 0.0], 1e-3).expect("below rounding");
         assert!(made.is_within(1e-15));
     }
 }

@@ -12,7 +12,7 @@
 //!
 //! by Gauss-Kronrod panels, halved where the estimates are largest.
 
-use super::faces::{Faces, QUANTITIES, Seen};
+use super::faces::{Faces, Flux, QUANTITIES, Seen};
 use crate::math::quadrature::{Integral, panel_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -77,6 +77,8 @@ pub(super) struct Panel {
     changes: Vec<[Line; 2]>,
     /// By how much the integrands differ from line to line, over the whole panel.
     spread: [f64; QUANTITIES],
+    /// The integrands of the first and the last line, per unit of the sheet's parameter.
+    verges: [Flux; 2],
 }
 
 impl Panel {
@@ -85,7 +87,9 @@ impl Panel {
         let mut lines: Vec<Line> = Vec::new();
         let mut low = [f64::INFINITY; QUANTITIES];
         let mut high = [f64::NEG_INFINITY; QUANTITIES];
-        let mut flux = |u| {
+        let (mut verges, mut outermost) =
+            ([[0.0; QUANTITIES]; 2], [f64::INFINITY, f64::NEG_INFINITY]);
+        let mut flux = |u: f64| {
             let (t, slope) = span.place(u);
             let (flux, extremes, seen) = faces.flux_and_extremes(span.sheet, t);
             for (best, reach) in furthest.iter_mut().zip(extremes) {
@@ -96,6 +100,12 @@ impl Panel {
             lines.extend(seen.map(|s: Seen| (t, s.signature)));
             for ((low, high), value) in low.iter_mut().zip(&mut high).zip(flux) {
                 (*low, *high) = (low.min(value), high.max(value));
+            }
+            if u < outermost[0] {
+                (outermost[0], verges[0]) = (u, flux);
+            }
+            if u > outermost[1] {
+                (outermost[1], verges[1]) = (u, flux);
             }
             flux.map(|f| f * slope)
         };
@@ -114,6 +124,7 @@ impl Panel {
             ends,
             changes,
             spread,
+            verges,
         }
     }
 
@@ -131,6 +142,16 @@ impl Panel {
         #[allow(clippy::float_cmp, reason = "halving keeps the ends")]
         let meets = self.range()[1] == other.range()[0];
         meets && self.sheet() == other.sheet()
+    }
+
+    /// What the place may be off by at which this one ends and the other begins, of quantity `k`: where the integrand
+    /// steps there, an edge runs along the line, and is found as the lines see it, to within hairs.
+    pub(super) fn joint(&self, other: &Self, k: usize, faces: &Faces) -> f64 {
+        if !(self.is_followed_by(other) && self.is_graded(1) && other.is_graded(0)) {
+            return 0.0;
+        }
+        let step = (other.verges[0][k] - self.verges[1][k]).abs();
+        step * faces.uncertain(self.sheet(), self.range()[1])
     }
 
     /// Whether it can be cut or halved at all.
@@ -220,12 +241,23 @@ impl Panel {
         };
         let moved = self.integrals[EDGES].value.abs() * faces.reach().powi(power);
         // Where the order of the lines is unknown, any of them may stand for the others.
-        let unknown = if self.changes.is_empty() {
-            0.0
-        } else {
-            self.spread[k]
-        };
+        let unknown = self.spread[k] * self.unknown_share();
         moved + unknown + 4.0 * f64::EPSILON * self.integrals[k].value.abs()
+    }
+
+    /// The share of its width over which the order of its lines is not known: all, where it changes between points of
+    /// the rule; where it does beyond the outermost, what is left there.
+    fn unknown_share(&self) -> f64 {
+        let (Some([first, last]), [from, to]) = (self.ends, self.range()) else {
+            return 0.0;
+        };
+        #[allow(clippy::float_cmp, reason = "places are kept")]
+        let at_verge = |c: &[Line; 2]| c[0].0 == first.0 || c[1].0 == last.0;
+        if !self.changes.iter().all(at_verge) {
+            return 1.0;
+        }
+        let gaps: f64 = self.changes.iter().map(|c| c[1].0 - c[0].0).sum();
+        (gaps / (to - from)).min(1.0)
     }
 
     /// The largest error as a multiple of its tolerance.

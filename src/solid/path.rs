@@ -26,9 +26,7 @@ pub(super) enum Path {
     Face { line: Arc<FaceLine>, off: f64 },
 }
 
-/// Half width of a stretch below which a parabola is trusted. Beside an edge in which two faces meet the distance has a
-/// kink that three values need not show, and two crossings so near to each other may be lost: what they bound is of the
-/// order of this squared.
+/// Half width of a stretch below which a parabola is trusted.
 const TRUST: f64 = 1e-5;
 /// Half width down to which stretches are halved: two crossings nearer to each other than this are
 /// taken for none.
@@ -336,7 +334,7 @@ impl Path {
             if !small && (level % 2 == 0 || middle.abs() <= GRAZING * clear) {
                 let within = |s: f64| signed(s, 4.0 * clear + limit);
                 steps += 9;
-                let made = Polynomial::new(&within, m, h, 0.25 * margin, 2.0 * clear);
+                let made = Polynomial::new(&within, m, h, [0.25 * margin, near], 2.0 * clear);
                 let runs = made.as_ref().is_some_and(|f| f.is_within(near));
                 along |= runs;
                 if runs {
@@ -357,9 +355,15 @@ impl Path {
                 let limit = middle.abs() + limit;
                 let [fa, fb] = ends.unwrap_or_else(|| [a, b].map(|s| signed(s, limit)));
                 values = Some([fa, middle, fb]);
+                let on = [fa, middle, fb].iter().all(|f| f.abs() <= 0.5 * margin);
+                if on && h > FLOOR {
+                    // On the surface, as far as distances tell.
+                    along = true;
+                    continue;
+                }
                 let within = |s: f64| signed(s, limit);
                 let fine = h <= FLOOR || seen > MANY || !(m > a && m < b);
-                match parabola([fa, middle, fb]) {
+                match parabola([fa, middle, fb], speed * h) {
                     Crossings::None => continue,
                     Crossings::One => {
                         let (place, taken) = root(&within, [a, b], [fa, fb], 0.25 * margin);
@@ -374,16 +378,19 @@ impl Path {
                         if (fa < 0.0) != (fb < 0.0) {
                             let zero = 0.25 * margin;
                             let (place, taken) = root(&within, [a, b], [fa, fb], zero);
-                            // Where it touches, the distance is in doubt as far as it stays near 0.
-                            let mut reach = h;
+                            // In doubt as far as the distance stays near 0: where it touches that is long, beside
+                            // an edge much less than this stretch.
                             let near_zero = |s: f64| within(s).abs() <= 2.0 * zero;
-                            while reach < whole && near_zero(m - reach) && near_zero(m + reach) {
+                            let mut reach = 4.0 * zero / speed;
+                            while reach < whole
+                                && (near_zero(place - reach) || near_zero(place + reach))
+                            {
                                 reach *= 4.0;
                                 steps += 2;
                             }
                             out.push(Crossing {
                                 place,
-                                slope: ((fb - fa).abs() / (b - a)).max(2.0 * zero / reach),
+                                slope: 2.0 * zero / reach,
                             });
                             steps += taken;
                         }
@@ -425,6 +432,9 @@ struct Open {
     level: u32,
 }
 
+/// Share of the most that distances may change over half a stretch from which they count as bent.
+const KINK: f64 = 1e-3;
+
 /// How often a stretch crosses a surface.
 enum Crossings {
     None,
@@ -432,9 +442,17 @@ enum Crossings {
     Unknown,
 }
 
-/// What a parabola through the signed distances of both ends and the middle says.
-fn parabola([a, m, b]: [f64; 3]) -> Crossings {
+/// What a parabola through the signed distances of both ends and the middle says; `way` is the most that they may differ
+/// by between the middle and an end.
+///
+/// So short a stretch is bent only where it passes an edge. The distance then has a kink, and between two values the
+/// path may be on the other side, unless both are too large for that.
+fn parabola([a, m, b]: [f64; 3], way: f64) -> Crossings {
     let (slope, bend) = (0.5 * (b - a), 0.5 * (a + b) - m);
+    let kink = bend.abs() > KINK * way;
+    if kink && (a < 0.0) == (b < 0.0) && (a.abs() + m.abs()).min(m.abs() + b.abs()) <= way {
+        return Crossings::Unknown;
+    }
     let straight = bend.abs() <= 0.1 * slope.abs();
     if (a < 0.0) != (b < 0.0) {
         return if straight {

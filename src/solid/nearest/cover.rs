@@ -5,7 +5,7 @@
 //! share of the composite's size and count as both.
 
 use super::boxes::{Boxes, away};
-use super::sheet::Tile;
+use super::sheet::{Sheet, Tile};
 use super::visible::{Scene, Spot};
 use crate::math::Aabb;
 use rayon::prelude::*;
@@ -51,12 +51,49 @@ pub(super) fn covers(scene: &Scene) -> Vec<Cover> {
     (0..scene.bodies.len()).map(of_body).collect()
 }
 
+/// Whether no sheet is seen anywhere: neither as a tile nor in the middle of one that is not told.
+pub(super) fn are_hidden(scene: &Scene) -> bool {
+    let is_hidden = |index: usize| {
+        let sheet = &scene.sheets[index];
+        let mut hidden = true;
+        divide_with(scene, index, |tile, sort| {
+            hidden &= match sort {
+                Sort::Visible => false,
+                Sort::Hidden => true,
+                Sort::Either => !spot(scene, sheet, tile).is_some_and(|s| scene.is_visible(s)),
+            };
+        });
+        hidden
+    };
+    (0..scene.sheets.len()).into_par_iter().all(is_hidden)
+}
+
 /// The boxes of the tiles of a sheet that may be hidden, and of those that may be visible.
 fn divide(scene: &Scene, index: usize) -> [Vec<Aabb>; 2] {
     let sheet = &scene.sheets[index];
+    let room = 1e-9 * scene.size;
+    let mut out = [Vec::new(), Vec::new()];
+    divide_with(scene, index, |tile, sort| {
+        let bounds = sheet.tile_box(tile);
+        let bounds = Aabb {
+            min: bounds.min - room,
+            max: bounds.max + room,
+        };
+        if !matches!(sort, Sort::Visible) {
+            out[0].push(bounds);
+        }
+        if !matches!(sort, Sort::Hidden) {
+            out[1].push(bounds);
+        }
+    });
+    out
+}
+
+/// Calls `each` with the tiles that a sheet is divided into.
+fn divide_with(scene: &Scene, index: usize, mut each: impl FnMut(&Tile, Sort)) {
+    let sheet = &scene.sheets[index];
     let fine = FINE * scene.size;
     let share = (MOST_TILES / scene.sheets.len()).min(MOST_TILES / 20);
-    let mut out = [Vec::new(), Vec::new()];
     let mut work = std::collections::VecDeque::from([Tile::ALL]);
     let mut seen = 0;
     while let Some(tile) = work.pop_front() {
@@ -71,22 +108,22 @@ fn divide(scene: &Scene, index: usize) -> [Vec<Aabb>; 2] {
         };
         if reach > large && seen < share {
             work.extend(tile.halves(usize::from(sides[1] > sides[0])));
-            continue;
-        }
-        let bounds = sheet.tile_box(&tile);
-        let room = 1e-9 * scene.size;
-        let bounds = Aabb {
-            min: bounds.min - room,
-            max: bounds.max + room,
-        };
-        if !matches!(sort, Sort::Visible) {
-            out[0].push(bounds);
-        }
-        if !matches!(sort, Sort::Hidden) {
-            out[1].push(bounds);
+        } else {
+            each(&tile, sort);
         }
     }
-    out
+}
+
+/// The middle of a tile, where that is well within the sheet's borders.
+fn spot(scene: &Scene, sheet: &Sheet, tile: &Tile) -> Option<Spot> {
+    let point = sheet.point(tile.middle());
+    let within = sheet.margin(point) > 4.0 * scene.hair();
+    let normal = sheet.value(point).1.try_normalize().filter(|_| within)?;
+    Some(Spot {
+        point,
+        normal,
+        body: sheet.body,
+    })
 }
 
 fn sort(scene: &Scene, index: usize, tile: &Tile, reach: f64) -> Sort {
@@ -105,19 +142,10 @@ fn sort(scene: &Scene, index: usize, tile: &Tile, reach: f64) -> Sort {
             return Sort::Either;
         }
     }
-    let inside = sheet.margin(x) > 4.0 * scene.hair();
-    let Some(normal) = sheet.value(x).1.try_normalize().filter(|_| inside) else {
-        return Sort::Either;
-    };
-    let spot = Spot {
-        point: x,
-        normal,
-        body: sheet.body,
-    };
-    if scene.is_visible(spot) {
-        Sort::Visible
-    } else {
-        Sort::Hidden
+    match spot(scene, sheet, tile) {
+        Some(spot) if scene.is_visible(spot) => Sort::Visible,
+        Some(_) => Sort::Hidden,
+        None => Sort::Either,
     }
 }
 

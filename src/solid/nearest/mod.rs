@@ -55,6 +55,8 @@ pub(crate) struct Nearest {
     edges: ArcTree,
     /// One for each body; made for the first grid.
     covers: OnceLock<Vec<Cover>>,
+    /// Whether there is no boundary at all; asked where none is found.
+    empty: OnceLock<bool>,
 }
 
 impl Nearest {
@@ -97,17 +99,21 @@ impl Nearest {
             scene,
             edges,
             covers: OnceLock::new(),
+            empty: OnceLock::new(),
         })
     }
 
-    /// The unsigned distance to the boundary, where a lower bound is known; infinite where there is none.
-    pub(super) fn distance(&self, point: DVec3, least: f64) -> f64 {
+    /// The unsigned distance to the boundary, where a lower bound is known; infinite where there is no boundary, `None`
+    /// where there is some that is not found, as of a body that is thinner than faces are told apart.
+    pub(super) fn distance(&self, point: DVec3, least: f64) -> Option<f64> {
         let p = point - self.middle;
         if !(p.abs().max_element() <= FAR * self.scene.size) {
-            return least;
+            return Some(least);
         }
         let limit = self.edges.distance(p, f64::INFINITY);
-        self.faces(p, limit, |_, _| true, |_| true).max(least)
+        let found = self.faces(p, limit, |_, _| true, |_| true);
+        let is_so = found.is_finite() || *self.empty.get_or_init(|| cover::are_hidden(&self.scene));
+        is_so.then(|| found.max(least))
     }
 
     /// The distance to what the bodies of which `asked` is so have on the boundary, or the limit where that is less.
