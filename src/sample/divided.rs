@@ -15,7 +15,7 @@
 use super::fraction::{Share, open_terms, reach};
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::{HalfSpace, box_volume_within};
-use crate::solid::{Assembly, Body, Factor, TOLERANCE, Term};
+use crate::solid::{Assembly, Body, Factor, SNAP, TOLERANCE, Term};
 use glam::DVec3;
 use smallvec::SmallVec;
 use std::collections::BinaryHeap;
@@ -391,10 +391,16 @@ pub(super) fn share(assembly: &Assembly, terms: &[Term], centre: DVec3, sides: D
     let cells = heap.into_sorted_vec();
     let inside: f64 = cells.iter().map(|c| voxel.inside(c)).sum();
     let left: f64 = cells.iter().map(|c| c.doubt).sum();
+    // Of parts that sum to nothing, or to everything, rounding may be left.
+    let (value, snapped) = match inside / voxel.volume {
+        share if share < SNAP => (0.0, SNAP),
+        share if share > 1.0 - SNAP => (1.0, SNAP),
+        share => (share, 0.0),
+    };
     Integral {
-        value: (inside / voxel.volume).clamp(0.0, 1.0),
+        value,
         // What is in doubt counts half.
-        error: 0.5 * left / voxel.volume,
+        error: 0.5 * left / voxel.volume + snapped,
     }
 }
 

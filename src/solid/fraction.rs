@@ -30,7 +30,7 @@ use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
 
 /// Share of the voxel below which a sum of areas is taken as nothing, or as everything: rounding.
-pub(super) const SNAP: f64 = 1e-11;
+pub(crate) const SNAP: f64 = 1e-11;
 /// Estimated error of one stretch of a piece, as a share of the voxel: a hundredth of what is
 /// promised, for the few stretches a voxel meets.
 pub(crate) const TOLERANCE: f64 = 1e-8;
