@@ -27,15 +27,18 @@ voxelize() { "$VOXLATHE" voxelize "$scenes/$1.toml" -o "$2" --resolution "$3" $f
 
 voxelize vase "$work/old" 5
 voxelize goblet "$work/new" 4
+# Of runs that are left to end before they are harmed.
+voxelize goblet "$work/large" 90
 digests() { (cd "$1" && sha256sum manifest.json slice-*.exr 2>/dev/null | sort -k 2); }
 old=$(digests "$work/old")
 new=$(digests "$work/new")
+large=$(digests "$work/large")
 
 # What the directory holds by itself, without a look at staged files: it may be between the two.
 whole() {
     local now
     now=$(digests "$1")
-    [ "$now" = "$old" ] || [ "$now" = "$new" ]
+    [ "$now" = "$old" ] || [ "$now" = "$new" ] || [ "$now" = "$large" ]
 }
 
 lose() { lost=$((lost + 1)); echo "LOST: $*"; }
