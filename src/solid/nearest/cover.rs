@@ -17,6 +17,9 @@ const COARSE: f64 = 1.0 / 32.0;
 /// Tiles looked at of all sheets together; what is left of a sheet's share is not divided.
 const MOST_TILES: usize = 1_000_000;
 
+/// Shortest side of a body's box, as a share of the composite's size, below which nothing is said to be empty.
+const SLENDER: f64 = 1e-2;
+
 /// One body's boxes.
 #[derive(Debug)]
 pub(super) struct Cover {
@@ -51,8 +54,13 @@ pub(super) fn covers(scene: &Scene) -> Vec<Cover> {
     (0..scene.bodies.len()).map(of_body).collect()
 }
 
-/// Whether no sheet is seen anywhere: neither as a tile nor in the middle of one that is not told.
+/// Whether no sheet is seen anywhere: neither as a tile nor in the middle of one that is not told. Not where a body is so
+/// slender that tiles may have passed over what is left of it.
 pub(super) fn are_hidden(scene: &Scene) -> bool {
+    let slender = |b: &Aabb| b.sides().min_element() < SLENDER * scene.size;
+    if scene.bodies.iter().any(|b| slender(&b.bounds())) {
+        return false;
+    }
     let is_hidden = |index: usize| {
         let sheet = &scene.sheets[index];
         let mut hidden = true;
