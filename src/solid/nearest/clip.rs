@@ -12,6 +12,8 @@ use smallvec::SmallVec;
 
 /// Parts looked at in one arc before those that are left are told by their middles.
 const MOST_PARTS: u32 = 3000;
+/// Looks at both sheets that a part takes.
+const LOOKS: u64 = 16;
 /// Half length, as a share of the composite's size, of the parts that are told by their middles.
 const FLOOR: f64 = 1e-12;
 
@@ -26,8 +28,13 @@ enum Change {
 
 type Changes = SmallVec<[Change; 16]>;
 
-/// The parts of the arcs of a crossing that are edges.
-pub(super) fn edges(scene: &Scene, crossing: &Crossing<'_>, arcs: &[Arc], out: &mut Vec<Arc>) {
+/// The parts of the arcs of a crossing that are edges; `None` where the work is too much.
+pub(super) fn edges(
+    scene: &Scene,
+    crossing: &Crossing<'_>,
+    arcs: &[Arc],
+    out: &mut Vec<Arc>,
+) -> Option<()> {
     let own = crossing.sheets.map(|s| s.body);
     let others = (0..scene.bodies.len()).filter(|b| !own.contains(b));
     let all: Changes = [Change::Border(0), Change::Border(1)]
@@ -40,8 +47,9 @@ pub(super) fn edges(scene: &Scene, crossing: &Crossing<'_>, arcs: &[Arc], out: &
             crossing,
             arc,
         };
-        clip.parts(&all, out);
+        clip.parts(&all, out)?;
     }
+    Some(())
 }
 
 struct Clip<'a> {
@@ -75,7 +83,7 @@ impl Clip<'_> {
         })
     }
 
-    fn parts(&self, all: &Changes, out: &mut Vec<Arc>) {
+    fn parts(&self, all: &Changes, out: &mut Vec<Arc>) -> Option<()> {
         let speed = self.arc.curve.speed();
         let floor = FLOOR * self.scene.size;
         let mut work = vec![([self.arc.from, self.arc.to], all.clone())];
@@ -83,6 +91,7 @@ impl Clip<'_> {
         let mut seen = 0;
         while let Some(([from, to], changes)) = work.pop() {
             seen += 1;
+            self.crossing.spend(LOOKS)?;
             let middle = 0.5 * (from + to);
             let reach = 0.5 * (to - from) * speed + self.scene.hair();
             let mut open = Changes::new();
@@ -126,6 +135,7 @@ impl Clip<'_> {
             }
         }
         self.keep(kept, out);
+        Some(())
     }
 
     fn is_edge(&self, s: f64, crowded: bool) -> bool {

@@ -35,6 +35,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use sheet::Sheet;
 use smallvec::SmallVec;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, OnceLock};
 use trace::Crossing;
 use visible::{Scene, Spot};
@@ -221,6 +222,7 @@ fn pairs(scene: &Scene) -> Vec<[usize; 2]> {
 
 /// The edges of the composite where bodies cross.
 fn edges(scene: &Scene, pairs: &[[usize; 2]]) -> Option<Vec<arc::Arc>> {
+    let work = AtomicU64::new(0);
     let of_pair = |&[i, j]: &[usize; 2]| {
         if scene.same[i].contains(&j) {
             return Some(Vec::new());
@@ -231,9 +233,10 @@ fn edges(scene: &Scene, pairs: &[[usize; 2]]) -> Option<Vec<arc::Arc>> {
         let crossing = Crossing {
             sheets,
             size: scene.size,
+            work: &work,
         };
         let mut edges = Vec::new();
-        clip::edges(scene, &crossing, &crossing.curves()?, &mut edges);
+        clip::edges(scene, &crossing, &crossing.curves()?, &mut edges)?;
         Some(edges)
     };
     let found: Option<Vec<Vec<arc::Arc>>> = pairs.par_iter().map(of_pair).collect();

@@ -440,6 +440,17 @@ impl Sheet {
         sheet
     }
 
+    /// What a look at it costs, compared with one at a plane.
+    pub(super) fn price(&self) -> u64 {
+        match &self.form {
+            Form::Swept {
+                profile: Profile::Rational { .. },
+                ..
+            } => 20,
+            _ => 1,
+        }
+    }
+
     /// Value and gradient.
     pub(super) fn value(&self, x: DVec3) -> (f64, DVec3) {
         let q = self.place.local(x);

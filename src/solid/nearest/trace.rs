@@ -18,11 +18,14 @@ use super::arc::{Arc, DEGREE, Polynomial, node};
 use super::boxes::away;
 use super::sheet::{Sheet, Tile};
 use glam::DVec3;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// How far arcs may be from the sheets they are on, as a share of the composite's size.
 const DEVIATION: f64 = 2e-12;
 /// Tiles looked at for one pair of sheets.
 const MOST_TILES: u32 = 200_000;
+/// Looks at sheets of one composite, those at sheets that are swept by a curve counted by their price: some seconds.
+const MOST_WORK: u64 = 40_000_000;
 /// Arcs of one pair of sheets.
 const MOST_ARCS: usize = 20_000;
 /// Tiles of sheets that touch are divided down to this share of the smaller sheet.
@@ -34,6 +37,8 @@ const SHALLOW: f64 = 1e-6;
 pub(super) struct Crossing<'a> {
     pub(super) sheets: [&'a Sheet; 2],
     pub(super) size: f64,
+    /// What the crossings of a composite have taken so far, all together.
+    pub(super) work: &'a AtomicU64,
 }
 
 /// A point with what the sheets are there.
@@ -43,6 +48,15 @@ struct Contact {
 }
 
 impl Crossing<'_> {
+    /// Counts looks at both sheets; `None` once a composite has had all it gets. As what is counted does not depend on
+    /// the order, neither does whether that comes.
+    pub(super) fn spend(&self, looks: u64) -> Option<()> {
+        let prices = self.sheets.map(Sheet::price);
+        let spent = looks * (prices[0] + prices[1]);
+        let before = self.work.fetch_add(spent, Ordering::Relaxed);
+        (before + spent <= MOST_WORK).then_some(())
+    }
+
     fn contact(&self, x: DVec3) -> Contact {
         let [a, b] = self.sheets.map(|s| s.value(x));
         Contact {
@@ -189,6 +203,7 @@ impl Crossing<'_> {
         let mut seen = 0;
         while let Some(tile) = work.pop() {
             seen += 1;
+            self.spend(1)?;
             if seen > MOST_TILES {
                 return None;
             }
