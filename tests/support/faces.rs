@@ -702,14 +702,26 @@ impl Model {
         let near = |p: DVec3, best: Option<DVec3>| {
             p.distance(q) <= best.map_or(f64::INFINITY, |b| b.distance(q)) && self.active(p)
         };
-        for _ in 0..3000 {
+        // Those that are as near, as a rule all that matter, and every other time any.
+        let all: Vec<usize> = (0..n).collect();
+        let meets = |a: &usize| {
+            let foot = self.onto(&[*a], q);
+            foot.is_some_and(|p| p.distance(q) <= 1.5 * reach + 1e-12)
+        };
+        let close: Vec<usize> = all.iter().copied().filter(meets).collect();
+        for k in 0..3000 {
             let p = q + super::composite::sphere(random) * (reach * random.between(0.5, 1.2));
-            let (a, b, c) = (random.below(n), random.below(n), random.below(n));
-            if a == b || b == c || a == c {
-                continue;
-            }
+            let of = if k % 2 == 0 && close.len() > 1 {
+                &close
+            } else {
+                &all
+            };
+            let [a, b, c] = [0; 3].map(|_: usize| of[random.below(of.len())]);
             if let Some(p) = self.onto(&[a], p).filter(|&p| near(p, best)) {
                 best = Some(p);
+            }
+            if a == b {
+                continue;
             }
             if let Some(p) = self.onto(&[a, b], p) {
                 let curve = Curve {
@@ -717,9 +729,14 @@ impl Model {
                     step: 0.05 * reach,
                     points: Vec::new(),
                 };
-                if let Some(p) = self.along(&curve, p, q).filter(|&p| near(p, best)) {
-                    best = Some(p);
+                for p in [Some(p), self.along(&curve, p, q)] {
+                    if let Some(p) = p.filter(|&p| near(p, best)) {
+                        best = Some(p);
+                    }
                 }
+            }
+            if b == c || a == c {
+                continue;
             }
             if let Some(p) = self.onto(&[a, b, c], p).filter(|&p| near(p, best)) {
                 best = Some(p);

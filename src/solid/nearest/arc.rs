@@ -70,7 +70,7 @@ impl Polynomial {
     }
 
     /// A bound on the second derivative.
-    fn curl(&self) -> f64 {
+    pub(super) fn curl(&self) -> f64 {
         let terms = self.coefficients.iter().enumerate().skip(2);
         #[allow(clippy::cast_precision_loss, reason = "a small count")]
         terms.map(|(k, c)| (k * (k - 1)) as f64 * c.length()).sum()

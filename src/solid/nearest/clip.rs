@@ -5,6 +5,9 @@
 //! other is halved. What is 0 all along goes along the arc and changes nothing, either.
 
 use super::arc::Arc;
+use super::boxes::away;
+use super::fences::Fences;
+use super::sheet::{Jet, Sheet};
 use super::trace::Crossing;
 use super::visible::Scene;
 use glam::DVec3;
@@ -24,6 +27,26 @@ enum Change {
     Border(usize),
     /// Another body.
     Body(usize),
+}
+
+/// Part of an arc, by its parameter about the middle.
+struct Part {
+    middle: DVec3,
+    half: f64,
+    /// No point of it is further from the middle.
+    reach: f64,
+    /// The derivative in the middle, and bounds of the first and the second.
+    slope: DVec3,
+    speed: f64,
+    curl: f64,
+}
+
+/// Where a change meets a part.
+enum Met {
+    Nowhere,
+    /// All of the part is beyond a border.
+    Beyond,
+    Perhaps,
 }
 
 type Changes = SmallVec<[Change; 16]>;
@@ -76,15 +99,84 @@ impl Clip<'_> {
 
     /// Whether a function is 0 all along.
     fn is_still(&self, change: Change, [from, to]: [f64; 2]) -> bool {
-        let touch = 8.0 * self.scene.touch();
+        let touch = 2.0 * self.scene.hair();
         [0.0, 0.23, 0.61, 1.0].iter().all(|share| {
             let s = from + (to - from) * share;
             self.value(change, s, 2.0 * touch).abs() <= touch
         })
     }
 
+    /// The side of 0 on which a function stays all along a part, by its second derivatives; 0 where that is not known.
+    fn side(&self, f: &Jet, part: &Part) -> f64 {
+        let bend = f.bend * part.speed * part.speed + f.gradient.length() * part.curl;
+        let most = part.half * (f.gradient.dot(part.slope).abs() + 0.5 * bend * part.half);
+        if f.value.abs() > most + self.scene.hair() {
+            f.value.signum()
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether a part passes no fence of a sheet.
+    fn passes_none(&self, fences: &Fences, part: &Part) -> bool {
+        fences.each.iter().all(|fence| {
+            let beside = |f: &Jet| self.side(f, part) < 0.0;
+            self.side(&fence.across, part) != 0.0 || fence.along.as_ref().is_some_and(beside)
+        })
+    }
+
+    /// Whether a part meets a sheet nowhere, by what is known of the sheet alone.
+    fn is_off(&self, sheet: &Sheet, part: &Part) -> bool {
+        let (x, reach) = (part.middle, part.reach);
+        if away(&sheet.bounds, x) > reach {
+            return true;
+        }
+        let margin = sheet.margin(x);
+        let beyond = || {
+            let fences = sheet.fences(x, reach);
+            fences.are_all && self.passes_none(&fences, part)
+        };
+        margin < -reach || self.side(&sheet.jet(x, reach), part) != 0.0 || margin < 0.0 && beyond()
+    }
+
+    /// Whether all of a part that is on a sheet's surface is within the sheet's borders, or all beyond them.
+    fn stays(&self, sheet: &Sheet, part: &Part) -> bool {
+        let fences = sheet.fences(part.middle, part.reach);
+        let others = |s: &&Sheet| s.body == sheet.body && !std::ptr::eq(*s, sheet);
+        self.passes_none(&fences, part)
+            && (fences.are_all
+                || (self.scene.sheets.iter().filter(others)).all(|s| self.is_off(s, part)))
+    }
+
+    /// What a change is to a part that is longer than the way to it.
+    fn look(&self, change: Change, part: &Part) -> Met {
+        match change {
+            Change::Body(b) => {
+                let mut sheets = self.scene.sheets.iter().filter(|s| s.body == b);
+                let apart = |s: &Sheet| {
+                    self.is_off(s, part) || s.margin(part.middle) < 0.0 && self.stays(s, part)
+                };
+                if sheets.all(apart) {
+                    return Met::Nowhere;
+                }
+            }
+            Change::Border(k) => {
+                let own = self.crossing.sheets[k];
+                let margin = own.margin(part.middle);
+                if margin != 0.0 && self.stays(own, part) {
+                    return if margin > 0.0 {
+                        Met::Nowhere
+                    } else {
+                        Met::Beyond
+                    };
+                }
+            }
+        }
+        Met::Perhaps
+    }
+
     fn parts(&self, all: &Changes, out: &mut Vec<Arc>) -> Option<()> {
-        let speed = self.arc.curve.speed();
+        let (speed, curl) = (self.arc.curve.speed(), self.arc.curve.curl());
         let floor = FLOOR * self.scene.size;
         let mut work = vec![([self.arc.from, self.arc.to], all.clone())];
         let mut kept: Option<[f64; 2]> = None;
@@ -94,6 +186,14 @@ impl Clip<'_> {
             self.crossing.spend(LOOKS)?;
             let middle = 0.5 * (from + to);
             let reach = 0.5 * (to - from) * speed + self.scene.hair();
+            let part = Part {
+                middle: self.at(middle),
+                half: 0.5 * (to - from),
+                reach,
+                slope: self.arc.curve.slope(middle),
+                speed,
+                curl,
+            };
             let mut open = Changes::new();
             let (mut off, mut crowded) = (false, false);
             for change in changes {
@@ -104,6 +204,14 @@ impl Clip<'_> {
                 }
                 if value >= reach {
                     continue;
+                }
+                match self.look(change, &part) {
+                    Met::Nowhere => continue,
+                    Met::Beyond => {
+                        off = true;
+                        break;
+                    }
+                    Met::Perhaps => {}
                 }
                 if self.is_still(change, [from, to]) {
                     crowded = true;

@@ -22,6 +22,7 @@ mod boxes;
 mod clip;
 mod cover;
 mod feet;
+mod fences;
 mod sheet;
 mod trace;
 mod visible;

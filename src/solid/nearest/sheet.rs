@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 /// A frame without its scale.
 #[derive(Debug, Clone)]
-struct Place {
+pub(super) struct Place {
     origin: DVec3,
     axes: [DVec3; 3],
 }
@@ -39,12 +39,12 @@ impl Place {
         }
     }
 
-    fn local(&self, x: DVec3) -> DVec3 {
+    pub(super) fn local(&self, x: DVec3) -> DVec3 {
         let d = x - self.origin;
         DVec3::from_array(self.axes.map(|a| a.dot(d)))
     }
 
-    fn turned(&self, v: DVec3) -> DVec3 {
+    pub(super) fn turned(&self, v: DVec3) -> DVec3 {
         self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
     }
 
@@ -55,7 +55,7 @@ impl Place {
 
 /// A profile's piece in scene lengths.
 #[derive(Debug, Clone)]
-enum Profile {
+pub(super) enum Profile {
     Line {
         start: DVec2,
         along: DVec2,
@@ -76,7 +76,7 @@ enum Profile {
 
 /// A zero set.
 #[derive(Debug, Clone)]
-enum Form {
+pub(super) enum Form {
     Swept {
         profile: Profile,
         wedge: Option<Wedge>,
@@ -107,9 +107,18 @@ enum Form {
 pub(super) struct Sheet {
     /// Index of the body.
     pub(super) body: usize,
-    place: Place,
-    form: Form,
+    pub(super) place: Place,
+    pub(super) form: Form,
     pub(super) bounds: Aabb,
+}
+
+/// A smooth function at a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Jet {
+    pub(super) value: f64,
+    pub(super) gradient: DVec3,
+    /// A bound on the second derivatives about the point.
+    pub(super) bend: f64,
 }
 
 /// A part of a sheet: a rectangle of its parameters, each from 0 to 1.
@@ -331,21 +340,10 @@ impl Profile {
 
     /// A bound on the second derivatives of the value, turned about the axis, within `reach` of a point.
     fn bend(&self, q: DVec2, reach: f64) -> f64 {
-        let over = |length: f64| {
-            if length > 0.0 {
-                1.0 / length
-            } else {
-                f64::INFINITY
-            }
-        };
+        let over = |length: f64| over_axis(1.0, length);
         match self {
-            Self::Line { along, .. } => {
-                if along.y == 0.0 {
-                    0.0
-                } else {
-                    along.y.abs() * over(q.x - reach)
-                }
-            }
+            // The normal's part across the axis.
+            Self::Line { along, .. } => over_axis(along.y, q.x - reach),
             Self::Circle { centre, .. } => {
                 let tube = over((q - *centre).length() - reach);
                 if centre.x == 0.0 {
@@ -356,6 +354,18 @@ impl Profile {
             }
             Self::Rational { bend, .. } => (2.0 * bend).max(over(q.x - reach)),
         }
+    }
+}
+
+/// A bound on the second derivatives of a linear function of (ρ, z), turned about the axis: its slope along ρ over the
+/// least ρ.
+pub(super) fn over_axis(slope: f64, least: f64) -> f64 {
+    if slope == 0.0 {
+        0.0
+    } else if least > 0.0 {
+        slope.abs() / least
+    } else {
+        f64::INFINITY
     }
 }
 
@@ -474,6 +484,16 @@ impl Sheet {
             }
         };
         (value, self.place.turned(gradient))
+    }
+
+    /// Value, gradient, and what bounds the second derivatives within `reach` of a point.
+    pub(super) fn jet(&self, x: DVec3, reach: f64) -> Jet {
+        let (value, gradient) = self.value(x);
+        Jet {
+            value,
+            gradient,
+            bend: self.bend(x, reach),
+        }
     }
 
     /// A bound on the second derivatives within `reach` of a point.

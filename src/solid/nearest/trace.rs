@@ -9,7 +9,7 @@
 //! ```
 //!
 //! From each regular tile a curve that is not known is followed both ways, in arcs that are polynomials of its own
-//! length. Where sheets touch, no tile is regular; down to a size that is left open, crossings that Newton's method still
+//! length, out of the tile and of both sheets. Where sheets touch, no tile is regular; down to a size that is left open, crossings that Newton's method still
 //! finds are followed, too.
 //!
 //! * Accuracy: arcs are within [`DEVIATION`] of the sheets.
@@ -39,6 +39,29 @@ pub(super) struct Crossing<'a> {
     pub(super) size: f64,
     /// What the crossings of a composite have taken so far, all together.
     pub(super) work: &'a AtomicU64,
+}
+
+/// An end of what is followed of a curve.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    /// The point that it was followed from.
+    start: DVec3,
+    at: DVec3,
+    along: DVec3,
+}
+
+/// How following a curve ended.
+enum Followed {
+    Closed,
+    /// Where the sheets no longer cross.
+    Stuck,
+    Open(End),
+}
+
+/// Where a tile is.
+struct Ball {
+    centre: DVec3,
+    reach: f64,
 }
 
 /// A point with what the sheets are there.
@@ -152,39 +175,33 @@ impl Crossing<'_> {
         self.sheets.iter().any(|s| s.margin(middle) < -reach)
     }
 
-    /// Follows the curve through a point of it; whether it is closed.
-    fn follow(&self, start: DVec3, sign: f64, out: &mut Vec<Arc>) -> Option<bool> {
-        let tangent = |x: DVec3| {
-            let [a, b] = self.normals(x);
-            a.cross(b).try_normalize()
-        };
+    /// Follows a curve on from an open end, until it is beyond the sheets' borders and outside of a ball.
+    fn follow(&self, mut end: End, ball: &Ball, out: &mut Vec<Arc>) -> Option<Followed> {
         let smallest = 1e-7 * self.size;
-        let (mut x, mut along) = (start, tangent(start)? * sign);
         let mut length = 0.05 * self.size;
-        let mut first = true;
         loop {
-            let made = self.arc(x, along, length);
+            let made = self.arc(end.at, end.along, length);
             let Some(curve) = made else {
                 length *= 0.5;
                 if length < smallest {
-                    return Some(false);
+                    return Some(Followed::Stuck);
                 }
                 continue;
             };
-            if !first {
-                let (far, at) = curve.nearest(start, -1.0, 1.0);
+            if end.at != end.start {
+                let (far, at) = curve.nearest(end.start, -1.0, 1.0);
                 if far <= 1e-9 * self.size && at > -1.0 + 1e-9 {
                     out.push(Arc::new(curve, -1.0, at));
-                    return Some(true);
+                    return Some(Followed::Closed);
                 }
             }
-            first = false;
-            let outside = self.is_outside(&curve);
-            x = curve.at(1.0);
-            along = curve.slope(1.0).try_normalize()?;
+            let away = curve.at(0.0).distance(ball.centre) > ball.reach + curve.speed();
+            let outside = away && self.is_outside(&curve);
+            end.at = curve.at(1.0);
+            end.along = curve.slope(1.0).try_normalize()?;
             out.push(Arc::new(curve, -1.0, 1.0));
             if outside {
-                return Some(false);
+                return Some(Followed::Open(end));
             }
             if out.len() > MOST_ARCS {
                 return None;
@@ -193,9 +210,46 @@ impl Crossing<'_> {
         }
     }
 
+    /// Follows the curve through a point of it both ways.
+    fn follow_both(
+        &self,
+        start: DVec3,
+        ball: &Ball,
+        arcs: &mut Vec<Arc>,
+        open: &mut Vec<End>,
+    ) -> Option<()> {
+        let [a, b] = self.normals(start);
+        let along = a.cross(b).try_normalize()?;
+        for along in [along, -along] {
+            let end = End {
+                start,
+                at: start,
+                along,
+            };
+            match self.follow(end, ball, arcs)? {
+                Followed::Closed => break,
+                Followed::Stuck => {}
+                Followed::Open(end) => open.push(end),
+            }
+        }
+        Some(())
+    }
+
+    /// Follows on what ends within a ball: a curve that left the sheets may come back in it, as over a bore.
+    fn follow_on(&self, ball: &Ball, arcs: &mut Vec<Arc>, open: &mut Vec<End>) -> Option<()> {
+        let within = |end: &End| end.at.distance(ball.centre) <= ball.reach;
+        while let Some(k) = open.iter().position(within) {
+            let end = open.swap_remove(k);
+            if let Followed::Open(end) = self.follow(end, ball, arcs)? {
+                open.push(end);
+            }
+        }
+        Some(())
+    }
+
     /// All curves; `None` where there are more than are followed.
     pub(super) fn curves(&self) -> Option<Vec<Arc>> {
-        let mut arcs: Vec<Arc> = Vec::new();
+        let (mut arcs, mut ends): (Vec<Arc>, Vec<End>) = Default::default();
         let [a, b] = self.sheets;
         let small = |s: &Sheet| (s.bounds.max - s.bounds.min).max_element();
         let open = OPEN * small(a).min(small(b));
@@ -236,7 +290,7 @@ impl Crossing<'_> {
             if seed.distance(x) > 4.0 * reach || self.sine(seed) < SHALLOW {
                 continue;
             }
-            // A curve is followed as far as it is within the borders: beyond them nothing begins.
+            // A curve is followed as far as it is within the borders or the tile: beyond them nothing begins.
             if reach > open && self.sheets.iter().any(|s| s.margin(seed) < 0.0) {
                 let k = usize::from(sides[1] > sides[0]);
                 work.extend(tile.halves(k));
@@ -246,12 +300,11 @@ impl Crossing<'_> {
                 let near = 1e-7 * self.size;
                 away(&arc.bounds, seed) <= near && arc.curve.nearest(seed, -1.0, 1.0).0 <= near
             };
+            let ball = Ball { centre: x, reach };
             if arcs.iter().any(known) {
-                continue;
-            }
-            let closed = self.follow(seed, 1.0, &mut arcs)?;
-            if !closed {
-                self.follow(seed, -1.0, &mut arcs)?;
+                self.follow_on(&ball, &mut arcs, &mut ends)?;
+            } else {
+                self.follow_both(seed, &ball, &mut arcs, &mut ends)?;
             }
             if arcs.len() > MOST_ARCS {
                 return None;

@@ -28,6 +28,12 @@ use std::sync::Arc;
 const TOUCH: f64 = 1e-13;
 const HAIR: f64 = 2e-12;
 const ASIDE: f64 = 1e-5;
+/// Directions that faces are unlikely to lie along.
+const ASKEW: [[f64; 3]; 3] = [
+    [0.51, 0.29, 0.81],
+    [-0.37, 0.86, -0.35],
+    [0.77, -0.53, -0.36],
+];
 
 /// A point of the surface of one body, with its normal.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +72,17 @@ struct Around {
     step: f64,
     /// Whether surfaces other than those given meet the point.
     met: bool,
+}
+
+/// Unit vectors across a normal, all around it, none of them along an axis as a rule.
+fn directions(normal: DVec3) -> impl Iterator<Item = DVec3> {
+    const COUNT: u32 = 8;
+    let e = normal.any_orthonormal_vector();
+    let f = normal.cross(e);
+    (0..COUNT).map(move |k| {
+        let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_4 + 0.1).sin_cos();
+        e * cos + f * sin
+    })
 }
 
 impl Scene {
@@ -124,11 +141,23 @@ impl Scene {
         Around { near, step, met }
     }
 
-    fn state(&self, around: &Around, x: DVec3) -> bool {
-        self.holds(|b| match around.near[b] {
-            Near::Far(side) => side,
-            Near::Here => self.bodies[b].side(x),
-        })
+    /// Whether the composite holds a place; `None` where it is on the surface of a body, so that what is beside it
+    /// tells.
+    fn state(&self, around: &Around, x: DVec3) -> Option<bool> {
+        let sides: SmallVec<[Side; 16]> = (around.near.iter().enumerate())
+            .map(|(b, near)| match near {
+                Near::Far(side) => *side,
+                Near::Here => self.bodies[b].side(x),
+            })
+            .collect();
+        (!sides.contains(&Side::On)).then(|| self.holds(|b| sides[b]))
+    }
+
+    /// Whether the composite holds a place, or one just beside it where a face passes through.
+    fn holds_beside(&self, around: &Around, x: DVec3) -> bool {
+        let aside = ASKEW.map(|d| x + DVec3::from_array(d) * (0.1 * around.step));
+        let places = std::iter::once(x).chain(aside);
+        (places.filter_map(|x| self.state(around, x)).next()).unwrap_or_default()
     }
 
     /// Whether the composite's boundary passes a spot.
@@ -148,25 +177,27 @@ impl Scene {
     }
 
     fn differs(&self, around: &Around, spot: &Spot) -> bool {
-        let beside =
-            |sign: f64| self.state(around, spot.point + spot.normal * (sign * around.step));
-        beside(1.0) != beside(-1.0)
+        let differs = |aside: DVec3| {
+            let place = |sign: f64| spot.point + aside + spot.normal * (sign * around.step);
+            Some(self.state(around, place(1.0))? != self.state(around, place(-1.0))?)
+        };
+        // Where a face passes through a place, as faces that are flush do, both its sides are asked.
+        differs(DVec3::ZERO).unwrap_or_else(|| {
+            let mut all = directions(spot.normal).map(|d| d * (0.5 * around.step));
+            all.any(|aside| differs(aside) == Some(true))
+        })
     }
 
     /// Where a surface that meets the spot has the same tangent plane there, what is between the two is nothing at the
     /// spot, but may be something beside it.
     #[cold]
     fn differs_aside(&self, around: &Around, spot: &Spot) -> bool {
-        const DIRECTIONS: u32 = 8;
         if !self.touches_any(around, spot) {
             return false;
         }
-        let e = spot.normal.any_orthonormal_vector();
-        let f = spot.normal.cross(e);
         let aside = ASIDE * self.size;
-        (0..DIRECTIONS).any(|k| {
-            let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_4 + 0.1).sin_cos();
-            let place = spot.point + (e * cos + f * sin) * aside;
+        directions(spot.normal).any(|direction| {
+            let place = spot.point + direction * aside;
             let body = &self.bodies[spot.body];
             let foot = body.foot(place, body.side(place) != Side::Outside);
             let Some(point) = foot.filter(|p| p.distance(place) <= 0.1 * aside) else {
@@ -246,7 +277,7 @@ impl Scene {
         let (u, v) = (a - b * c, b - a * c);
         let state = |d: DVec3| {
             let d = d.normalize_or_zero();
-            self.state(&around, x + d * around.step)
+            self.holds_beside(&around, x + d * around.step)
         };
         let [pp, pm, mp, mm] = [u + v, u - v, v - u, -u - v].map(state);
         if crowded || around.met {
