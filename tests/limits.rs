@@ -8,7 +8,7 @@ use std::fs;
 use std::os::unix::ffi::OsStringExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
@@ -160,6 +160,25 @@ fn limited(limits: &str, arguments: &[&str]) -> Output {
         .expect("a shell")
 }
 
+/// Runs the command and looks at what it has in memory, every millisecond: how it ended, what it said, and the most KiB
+/// that were seen.
+fn watched(arguments: &[&str]) -> (Option<i32>, String, u64) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_voxlathe"))
+        .args(arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    let status = format!("/proc/{}/status", child.id());
+    let mut most = 0;
+    while child.try_wait().expect("told").is_none() {
+        most = most.max(told(&status, "VmHWM:"));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let ended = child.wait_with_output().expect("ended");
+    let err = String::from_utf8_lossy(&ended.stderr).into_owned();
+    (ended.status.code(), err, most)
+}
+
 #[test]
 fn dense_texts_take_the_memory_of_their_values() {
     let t = scratch();
@@ -167,19 +186,73 @@ fn dense_texts_take_the_memory_of_their_values() {
     for (element, wanted) in [
         ("[],", "wanted"),
         ("1,", "wanted"),
+        ("[1,2],", "wanted"),
         ("{},", "at most 1000000 tables"),
     ] {
-        fs::write(
-            &file,
-            format!("a = [{}]\n", element.repeat((6 << 20) / element.len())),
-        )
-        .expect("written");
-        // 6 MiB: twenty times that, the pages of the program and of its threads' stacks.
-        let ended = limited("ulimit -v 400000", &["measure", &file, "--threads", "1"]);
-        let err = String::from_utf8_lossy(&ended.stderr);
-        assert_eq!(ended.status.code(), Some(2), "{element}: {err}");
+        let text = format!("a = [{}]\n", element.repeat((12 << 20) / element.len()));
+        fs::write(&file, &text).expect("written");
+        let (code, err, most) = watched(&["measure", &file, "--threads", "1"]);
+        assert_eq!(code, Some(2), "{element}: {err}");
         assert!(err.contains(wanted), "{element}: {err}");
+        // Twenty times the text, and the program.
+        let allowed = ((20 * text.len() as u64) >> 10) + 12_000;
+        assert!(most <= allowed, "{element}: {most} KiB of {allowed}");
+        assert!(
+            most > (text.len() as u64) >> 10,
+            "{element}: nothing was seen"
+        );
     }
+}
+
+/// A ring of a wavy outline.
+fn wavy(points: u32) -> String {
+    let at = |i: u32| {
+        let a = std::f64::consts::TAU * f64::from(i) / f64::from(points);
+        let r = 1.0 + 0.1 * (7.0 * a).sin();
+        format!("{},{}\n", 2.0 + r * a.cos(), r * a.sin())
+    };
+    (0..points).chain([0]).map(at).collect()
+}
+
+#[test]
+fn points_of_polylines_take_some_hundred_bytes() {
+    let t = scratch();
+    let [scene, out] = ["ring.toml", "out"].map(|name| below(&t, name));
+    let text = RING.replace(
+        "kind = 'circle', center = [2, 0], radius = 1",
+        "kind = 'polyline', points = { file = 'wavy.csv' }",
+    );
+    fs::write(&scene, text).expect("written");
+    let peak = |points: u32| {
+        fs::write(t.path().join("wavy.csv"), wavy(points)).expect("written");
+        let arguments = ["voxelize", &scene, "-o", &out, "--channels", "occupancy"];
+        let ended = run(&[&arguments[..], &["--dry-run", "--json"]].concat()).exits(0);
+        ended.json()["peak_memory_bytes"].as_u64().expect("a peak")
+    };
+    let (few, many) = (10_000, 200_000);
+    let each = (peak(many) - peak(few)) / u64::from(many - few);
+    assert!(each <= 450, "{each} bytes of a point");
+}
+
+#[test]
+fn tables_that_outgrow_the_limit_end_the_run_before_they_do() {
+    let t = scratch();
+    let [scene, out] = ["ring.toml", "out"].map(|name| below(&t, name));
+    let text = RING.replace(
+        "kind = 'circle', center = [2, 0], radius = 1",
+        "kind = 'polyline', points = { file = 'wavy.csv' }",
+    );
+    fs::write(&scene, text).expect("written");
+    fs::write(t.path().join("wavy.csv"), wavy(10_000)).expect("written");
+    let arguments = ["voxelize", &scene, "-o", &out, "--resolution", "64"];
+    let limit = ["--channels", "sdf", "--memory-limit", "48MiB"];
+    let ended = run(&[&arguments[..], &limit].concat()).exits(2);
+    assert!(
+        ended.err.contains("of which not all is made, needs"),
+        "{}",
+        ended.err
+    );
+    assert!(!Path::new(&out).exists());
 }
 
 #[test]
@@ -629,9 +702,11 @@ fn mutation(bases: &[Base], seed: u64, folder: &Path) {
     }
 }
 
-/// A number of KiB that the system tells of this process.
-fn told(name: &str) -> u64 {
-    let text = fs::read_to_string("/proc/self/status").unwrap_or_default();
+const OWN: &str = "/proc/self/status";
+
+/// A number of KiB that the system tells of a process.
+fn told(status: &str, name: &str) -> u64 {
+    let text = fs::read_to_string(status).unwrap_or_default();
     let line = text.lines().find_map(|l| l.strip_prefix(name));
     line.and_then(|l| l.trim().strip_suffix(" kB")?.parse().ok())
         .unwrap_or(0)
@@ -647,7 +722,7 @@ fn mutations(seeds: std::ops::Range<u64>) {
         loop {
             std::thread::sleep(Duration::from_millis(200));
             let [seed, since] = [0, 1].map(|n| AT[n].load(Ordering::SeqCst));
-            let memory = told("VmRSS:");
+            let memory = told(OWN, "VmRSS:");
             if seed != u64::MAX && (now().saturating_sub(since) > 60_000 || memory > 2 << 20) {
                 eprintln!("seed {seed}: {} ms, {memory} KiB", now() - since);
                 std::process::exit(99);
@@ -664,10 +739,10 @@ fn mutations(seeds: std::ops::Range<u64>) {
         let found = catch_unwind(AssertUnwindSafe(|| mutation(&bases, seed, folder.path())));
         let took = now() - start;
         slowest = slowest.max((took, seed));
-        if found.is_err() || took > 20_000 || told("VmHWM:") > 1 << 20 {
+        if found.is_err() || took > 20_000 || told(OWN, "VmHWM:") > 1 << 20 {
             failed.push((seed, took));
         }
-        if told("VmHWM:") > 1 << 20 {
+        if told(OWN, "VmHWM:") > 1 << 20 {
             break;
         }
     }
@@ -677,7 +752,7 @@ fn mutations(seeds: std::ops::Range<u64>) {
         begun.elapsed(),
         slowest.0,
         slowest.1,
-        told("VmHWM:")
+        told(OWN, "VmHWM:")
     );
     assert!(failed.is_empty(), "seeds and milliseconds: {failed:?}");
 }

@@ -45,9 +45,14 @@ pub(super) fn run(
     let budget = Budget::new(arguments.memory_limit);
     let workers = budget.workers(&need, rayon::current_num_threads())?;
     let bar = console.bar(plan.resolutions.len() as u64, "resolutions");
-    let found = study_with(workers, &scene, &plan, &interrupt::check, &mut |_| {
-        bar.inc(1)
-    })?;
+    let study = || {
+        study_with(workers, &scene, &plan, &interrupt::check, &mut |_| {
+            bar.inc(1)
+        })
+    };
+    // Each resolution has tables of its own.
+    let what = "the process with the tables of its solids";
+    let found = budget.while_watched(what, need.remedy, console, study)?;
     bar.finish_and_clear();
     let mut files = Vec::new();
     if let Some(writer) = writer {

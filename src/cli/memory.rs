@@ -9,14 +9,26 @@
 //!
 //! The limit is on the peak of the whole process. What cannot be kept is refused before any work, with the number that
 //! would do. The values do not depend on the limit: only how many layers are under way at the same time does.
+//!
+//! What tables take is known when they are made. While they are, a thread looks at the process every millisecond, and
+//! refuses the run where they outgrow the limit: before anything is written.
 
+use super::failure::Failure;
+use super::output::Console;
 use crate::error::Error;
+use crate::io::ending;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
 
 /// Program pages that are first touched later, what the allocator keeps beside what was asked for, and the stacks: 0.5 to 2 MiB
 /// were seen.
 const SPARE: u64 = 4 << 20;
 /// A worker's stack, its arena and its short-lived buffers.
 const SPARE_PER_WORKER: u64 = 1 << 19;
+/// How often the process is looked at while its tables are made; it grows by some MiB meanwhile.
+const LOOK: Duration = Duration::from_millis(1);
+/// How long the refusal waits for files that are being renamed: there are none yet.
+const PATIENCE: Duration = Duration::from_millis(100);
 /// What a process is taken to have where the system does not tell.
 const UNTOLD: u64 = 24 << 20;
 
@@ -63,6 +75,58 @@ impl Budget {
             ),
         })
     }
+}
+
+impl Budget {
+    /// Makes what nobody knows the size of beforehand. Where it outgrows the limit the process ends with a refusal.
+    pub(super) fn while_watched<T>(
+        &self,
+        what: &'static str,
+        remedy: &'static str,
+        console: &Console,
+        make: impl FnOnce() -> T,
+    ) -> T {
+        let (done, told) = channel::<()>();
+        let (limit, console) = (self.limit, *console);
+        let watch = move || {
+            while told.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                match resident() {
+                    Some(bytes) if bytes > limit.saturating_sub(SPARE / 2) => {
+                        refuse(what, remedy, bytes.saturating_add(SPARE), limit, &console)
+                    }
+                    Some(_) => {}
+                    None => break,
+                }
+            }
+        };
+        let watcher = std::thread::Builder::new().name("voxlathe-memory".into());
+        let watcher = watcher.spawn(watch);
+        let made = make();
+        drop(done);
+        // Without the thread the limit is held against what the tables have taken, afterwards.
+        let _ = watcher.map(std::thread::JoinHandle::join);
+        made
+    }
+}
+
+/// Says that the run takes more than there is, and ends the process.
+fn refuse(what: &str, remedy: &str, bytes: u64, limit: u64, console: &Console) -> ! {
+    ending::end(PATIENCE);
+    let failure = Failure::from(Error::TooLarge {
+        what: format!("{what}, of which not all is made,"),
+        needed: bytes,
+        available: limit,
+        remedy: format!("raise --memory-limit, to twice that or more, or {remedy}"),
+    });
+    failure.report(console);
+    std::process::exit(2);
+}
+
+/// What the process has in memory now, where the system tells it quickly.
+fn resident() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = text.split(' ').nth(1)?.parse().ok()?;
+    Some(pages.saturating_mul(rustix::param::page_size() as u64))
 }
 
 /// What a process has.

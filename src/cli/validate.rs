@@ -52,7 +52,9 @@ pub(super) fn run(
     };
     let threads = rayon::current_num_threads();
     budget.workers(&need, threads)?;
-    let meshes = meshes(&scene, chord_error)
+    let what = "the process with the triangles of its solids";
+    let meshes = || meshes(&scene, chord_error);
+    let meshes = (budget.while_watched(what, need.remedy, console, meshes))
         .map_err(|(name, e)| no_mesh(&name, &e, arguments.chord_error))?;
     // With the triangles it may be too much after all.
     let workers = budget.workers(&need, threads)?;

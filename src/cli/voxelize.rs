@@ -56,6 +56,9 @@ struct Seconds {
     total: f64,
 }
 
+/// What takes less memory.
+const LESS: &str = "lower the resolution or choose fewer channels";
+
 pub(super) fn run(
     arguments: &Voxelize,
     common: &Common,
@@ -70,7 +73,10 @@ pub(super) fn run(
     let mut plan = plan(&scene, arguments, common.kernel()?)?;
     let interrupted = || interrupt::check().is_err();
     let grid = plan.grid;
-    let sampler = LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection)
+    let what = "the process with the tables of its solids";
+    let tables = || LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection);
+    let sampler = (plan.budget)
+        .while_watched(what, LESS, console, tables)
         .with_scalars(plan.scalars.clone())
         .with_cancel(&interrupted);
     interrupt::check()?;
@@ -270,7 +276,7 @@ impl Plan {
             what: &format!("the process with a layer of {nx} x {ny} voxels at a time"),
             fixed: self.fixed_bytes,
             each: self.layer_bytes,
-            remedy: "lower the resolution or choose fewer channels",
+            remedy: LESS,
         };
         (self.budget).workers(&need, rayon::current_num_threads())
     }

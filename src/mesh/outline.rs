@@ -68,7 +68,7 @@ impl Outline {
         tolerance: f64,
         most: usize,
     ) -> Result<Self, NoOutline> {
-        let first = boundary.first().map_or([0.0; 2], |b| b.piece.bounds.min);
+        let first = boundary.first().map_or([0.0; 2], |b| b.piece.bounds().min);
         // Where curves touch without crossing, parts too short to tell inside from outside are missing.
         let pieces = welded(boundary.to_vec(), SAME_FACE).unwrap_or_else(|| boundary.to_vec());
         let mut points = Points::new(&pieces);
@@ -296,9 +296,9 @@ impl Points {
 
     /// The point at `t` of a piece; `None` where rounding does not tell it from its neighbours.
     fn inner(&mut self, piece: &Piece, t: f64, before: u32, end: u32) -> Option<u32> {
-        let twin = &piece.twin;
+        let twin = piece.twin();
         let p = twin.at(t);
-        let (low, high) = (piece.bounds.min, piece.bounds.max);
+        let (low, high) = (piece.bounds().min, piece.bounds().max);
         // Within the box of the ends, where the piece itself is.
         let p = tidy([0, 1].map(|c| (p[c] + twin.origin[c]).clamp(low[c], high[c])));
         let near = |i: u32| {
@@ -380,8 +380,8 @@ fn parameters(
 
 /// A bound on the distance between a piece from `a` to `b` and its chord.
 fn distance_to_chord(piece: &Piece, a: f64, b: f64) -> f64 {
-    let parts = [0, 1, 2].map(|c| {
-        let part = bernstein::restrict(&piece.twin.coefficients[c], a, b);
+    let parts = piece.twin().rows().map(|row| {
+        let part = bernstein::restrict(&row, a, b);
         bernstein::split(&part, 0.5)
     });
     let n = parts[0].0.len();

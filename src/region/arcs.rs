@@ -75,7 +75,7 @@ pub(crate) fn arcs(
     let whole = if piece.degree() == 1 {
         out.extend(Arc::segment(ends[0], ends[1]));
         true
-    } else if let Some((centre, radius)) = piece.circle {
+    } else if let Some((centre, radius)) = piece.circle() {
         out.extend(circle(ends, centre.map(Real::f64), radius.f64()));
         true
     } else {
@@ -139,13 +139,13 @@ impl Part {
     fn new(piece: &Piece) -> Self {
         let half = Dd::of(0.5);
         let origin = [0, 1].map(|c| ((piece.start[c] + piece.end[c]) * half).f64());
-        let weight = piece.points[0][2].f64();
+        let weight = piece.point(0)[2].f64();
         let coordinates = [0, 1, 2].map(|c| {
-            let about = |p: &[Dd; 3]| match c {
+            let about = |p: [Dd; 3]| match c {
                 2 => p[2],
                 c => p[c] - Dd::of(origin[c]) * p[2],
             };
-            (piece.points.iter().map(about))
+            (piece.points().map(about))
                 .map(|v| v.f64() / weight)
                 .collect()
         });

@@ -9,11 +9,13 @@ use super::crossings::{CrossingSet, Winding};
 use super::piece::Piece;
 use super::tree::{Box2, BoxTree};
 use crate::math::{Dd, Real};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A piece of a region's boundary.
 #[derive(Debug, Clone)]
 pub(crate) struct BoundaryPiece {
-    pub(crate) piece: Piece,
+    pub(crate) piece: Arc<Piece>,
     /// Whether the region lies on the left of the piece's own direction.
     pub(crate) forward: bool,
 }
@@ -56,7 +58,7 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The boundary of the set of points whose windings, one for each operand, `inside` accepts.
 /// `operand` tells which operand a piece belongs to.
 pub(crate) fn filled_boundary(
-    pieces: &[Piece],
+    pieces: &[Arc<Piece>],
     inside: &dyn Fn(&[Winding]) -> bool,
     operand: &dyn Fn(usize) -> usize,
     operands: usize,
@@ -70,23 +72,26 @@ pub(crate) fn filled_boundary(
             meetings: meetings.count,
         };
     }
-    let mut parts = Vec::new();
-    let (mut owner, mut from) = (Vec::new(), Vec::new());
+    let mut parts = Vec::with_capacity(pieces.len());
+    // The piece that each part is of.
+    let mut from: Vec<u32> = Vec::with_capacity(pieces.len());
+    #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
     for (i, piece) in pieces.iter().enumerate() {
-        cut_at(piece, &meetings.parameters[i], &mut parts);
-        owner.resize(parts.len(), operand(i));
-        from.resize(parts.len(), i);
+        let parameters = meetings.parameters.get(&i);
+        cut_at(piece, parameters.map_or(&[], |p| p), &mut parts);
+        from.resize(parts.len(), i as u32);
     }
+    let owner = |part: usize| operand(from[part] as usize);
     let set = CrossingSet::new(&parts);
-    let mut kept = Vec::new();
+    let mut kept = Vec::with_capacity(parts.len());
     // The state on both sides can only change where a piece meets another, so along a loop that
     // meets nothing one ray serves all pieces.
     let mut known: Option<Option<bool>> = None;
     for (i, part) in parts.iter().enumerate() {
-        let carried =
-            known.filter(|_| !meetings.tangled[from[i]] && parts[i - 1].end == part.start);
+        let tangled = meetings.tangled[from[i] as usize];
+        let carried = known.filter(|_| !tangled && parts[i - 1].end == part.start);
         let state = carried.or_else(|| side(&set, &parts, &owner, operands, coincident, i, inside));
-        known = state.filter(|_| !meetings.tangled[from[i]]);
+        known = state.filter(|_| !tangled);
         if let Some(Some(forward)) = state {
             let mut even = Vec::new();
             part.clone().even_parts(&mut even);
@@ -105,8 +110,8 @@ pub(crate) fn filled_boundary(
 /// `None` where the part is too short for its ray to tell.
 fn side(
     set: &CrossingSet,
-    parts: &[Piece],
-    owner: &[usize],
+    parts: &[Arc<Piece>],
+    owner: &dyn Fn(usize) -> usize,
     operands: usize,
     coincident: f64,
     i: usize,
@@ -135,12 +140,12 @@ fn side(
         middle[1 - c],
         coincident,
         |k, coincident, direction| {
-            before[owner[k]].cross(direction);
+            before[owner(k)].cross(direction);
             if coincident {
                 first &= k >= i;
                 seen_self |= k == i;
             } else {
-                beyond[owner[k]].cross(direction);
+                beyond[owner(k)].cross(direction);
             }
         },
     );
@@ -161,7 +166,7 @@ fn side(
 }
 
 /// The parts of a piece between the given parameters.
-fn cut_at(piece: &Piece, parameters: &[Dd], parts: &mut Vec<Piece>) {
+fn cut_at(piece: &Arc<Piece>, parameters: &[Dd], parts: &mut Vec<Arc<Piece>>) {
     if parameters.is_empty() {
         parts.push(piece.clone());
         return;
@@ -180,34 +185,40 @@ fn cut_at(piece: &Piece, parameters: &[Dd], parts: &mut Vec<Piece>) {
     });
     for to in ends.chain([(Dd::ONE, piece.end)]) {
         if from.1 != to.1 {
-            parts.push(if piece.degree() == 1 {
-                Piece::segment(from.1, to.1, piece.loop_index)
+            let mut part = if piece.degree() == 1 {
+                Piece::segment(from.1, to.1, piece.loop_index())
             } else {
                 piece.part(from.0, to.0, from.1, to.1)
-            });
-            if let Some(part) = parts.last_mut() {
-                part.on_axis = piece.on_axis;
-            }
+            };
+            part.on_axis = piece.on_axis;
+            parts.push(Arc::new(part));
         }
         from = to;
     }
 }
 
 struct Meetings {
-    /// For each piece, the parameters strictly inside it where it meets another.
-    parameters: Vec<Vec<Dd>>,
+    /// For each piece that meets another strictly inside it, the parameters where.
+    parameters: HashMap<usize, Vec<Dd>>,
     /// Whether a piece meets any but its neighbours in their common ends.
     tangled: Vec<bool>,
     count: usize,
     crossing: Option<[f64; 2]>,
 }
 
+impl Meetings {
+    /// Notes a parameter inside a piece.
+    fn cut(&mut self, piece: usize, at: Dd) {
+        self.parameters.entry(piece).or_default().push(at);
+    }
+}
+
 /// Where pieces meet other than at ends they share.
-fn meetings(pieces: &[Piece], coincident: f64) -> Meetings {
-    let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds.grown(ROUNDING)).collect();
+fn meetings(pieces: &[Arc<Piece>], coincident: f64) -> Meetings {
+    let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds().grown(ROUNDING)).collect();
     let tree = BoxTree::new(&boxes);
     let mut found = Meetings {
-        parameters: vec![Vec::new(); pieces.len()],
+        parameters: HashMap::new(),
         tangled: vec![false; pieces.len()],
         count: 0,
         crossing: None,
@@ -246,7 +257,7 @@ fn meet_only_in_corners(a: &Piece, b: &Piece) -> bool {
     for p in [a.start, a.end] {
         for q in [b.start, b.end] {
             if p == q {
-                let (p, ab, bb) = (p.map(Real::f64), &a.bounds, &b.bounds);
+                let (p, ab, bb) = (p.map(Real::f64), &a.bounds(), &b.bounds());
                 // Opposite corners: the boxes lie on the two sides of the point in one coordinate
                 // and the coordinate is not constant for both.
                 let apart = |c: usize| {
@@ -287,8 +298,9 @@ impl Part {
     }
     fn halves(&self, piece: &Piece) -> [Self; 2] {
         let m = 0.5 * (self.t[0] + self.t[1]);
-        let p = piece.twin.at(m);
-        let p = [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]];
+        let twin = piece.twin();
+        let p = twin.at(m);
+        let p = [p[0] + twin.origin[0], p[1] + twin.origin[1]];
         [
             Self {
                 t: [self.t[0], m],
@@ -318,7 +330,7 @@ fn meet(
             if let Some(t) = parameter_on(y, end, coincident) {
                 contacts += 1;
                 if t > Dd::ZERO && t < Dd::ONE {
-                    found.parameters[k].push(t);
+                    found.cut(k, t);
                     inner = true;
                 }
             }
@@ -332,8 +344,8 @@ fn meet(
         let Some((s, t)) = segments_cross(a, b) else {
             return touching;
         };
-        found.parameters[i].push(s);
-        found.parameters[j].push(t);
+        found.cut(i, s);
+        found.cut(j, t);
         let p = [0, 1].map(|c| (a.start[c] + s * (a.end[c] - a.start[c])).f64());
         found.crossing.get_or_insert(p);
         return true;
@@ -376,7 +388,7 @@ fn parameter_on(piece: &Piece, p: [Dd; 2], coincident: f64) -> Option<Dd> {
 
 /// Whether the middle of what two pieces in contact at two points share is shared too.
 fn coincide(a: &Piece, b: &Piece, coincident: f64) -> bool {
-    let (ab, bb) = (&a.bounds, &b.bounds);
+    let (ab, bb) = (&a.bounds(), &b.bounds());
     let min = [0, 1].map(|c| ab.min[c].max(bb.min[c]));
     let max = [0, 1].map(|c| ab.max[c].min(bb.max[c]));
     let c = usize::from(max[1] - min[1] >= max[0] - min[0]);
@@ -430,10 +442,10 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
                 (s, t) = polished([a, b], [s, t]).unwrap_or((s, t));
             }
             if inner(&x.t) {
-                found.parameters[i].push(s);
+                found.cut(i, s);
             }
             if inner(&y.t) {
-                found.parameters[j].push(t);
+                found.cut(j, t);
             }
             continue;
         }
@@ -455,7 +467,7 @@ fn polished([a, b]: [&Piece; 2], [s0, t0]: [Dd; 2]) -> Option<(Dd, Dd)> {
     for _ in 0..4 {
         let (p, q) = (a.at(s), b.at(t));
         let gap = [p[0] - q[0], p[1] - q[1]];
-        let (u, v) = (a.twin.slope(s.f64()), b.twin.slope(t.f64()));
+        let (u, v) = (a.twin().slope(s.f64()), b.twin().slope(t.f64()));
         let determinant = u[1] * v[0] - u[0] * v[1];
         // s' u - t' v = -gap, by Cramer's rule.
         let over = |w: Dd| w / Dd::of(determinant);
@@ -470,7 +482,7 @@ fn polished([a, b]: [&Piece; 2], [s0, t0]: [Dd; 2]) -> Option<(Dd, Dd)> {
 fn transversal(a: &Piece, s: f64, b: &Piece, t: f64) -> bool {
     let around = |piece: &Piece, t: f64| {
         let h = 1e-5_f64.min(t).min(1.0 - t);
-        let (p, q) = (piece.twin.at(t - h), piece.twin.at(t + h));
+        let (p, q) = (piece.twin().at(t - h), piece.twin().at(t + h));
         [q[0] - p[0], q[1] - p[1]]
     };
     let (u, v) = (around(a, s), around(b, t));

@@ -574,7 +574,7 @@ pub(in crate::region) mod tests {
     /// A part of the half-plane around a boundary, so many steps wide.
     pub(in crate::region) fn extent_of(swept: &[BoundaryPiece], voxels: f64) -> Extent {
         let (mut right, mut low, mut top) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for b in swept.iter().map(|b| b.piece.bounds) {
+        for b in swept.iter().map(|b| b.piece.bounds()) {
             right = right.max(b.max[0]);
             low = low.min(b.min[1]);
             top = top.max(b.max[1]);
@@ -592,7 +592,7 @@ pub(in crate::region) mod tests {
         for (name, region) in regions() {
             for voxels in [40.0, 300.0, 900.0] {
                 let swept = swept(&region);
-                let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
+                let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
                 let extent = extent_of(&swept, voxels);
                 let step = extent.cell;
                 let (arcs, cells) = (1.5e-5 * step, 4.5e-5 * step);

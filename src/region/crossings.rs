@@ -13,6 +13,7 @@ use super::tree::{Box2, BoxTree};
 use crate::math::tolerance::ON_BOUNDARY;
 use crate::math::{Dd, Real};
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 /// Signed and plain count of crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -46,8 +47,8 @@ pub(crate) struct CrossingSet {
 }
 
 impl CrossingSet {
-    pub(crate) fn new(pieces: &[Piece]) -> Self {
-        let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds).collect();
+    pub(crate) fn new(pieces: &[Arc<Piece>]) -> Self {
+        let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds()).collect();
         Self {
             tree: BoxTree::new(&boxes),
         }
@@ -58,7 +59,7 @@ impl CrossingSet {
     }
 
     /// Crossings by f64 alone, `None` where the rounding does not decide.
-    pub(crate) fn count(&self, pieces: &[Piece], p: MeridianPoint) -> Option<Winding> {
+    pub(crate) fn count(&self, pieces: &[Arc<Piece>], p: MeridianPoint) -> Option<Winding> {
         let mut winding = Winding::default();
         let mut decided = true;
         // Boxes are rounded to nearest; one ulp of the unit square covers that.
@@ -69,10 +70,11 @@ impl CrossingSet {
         let near = |b: &Box2| p.z >= b.min[1] - ez && p.z <= b.max[1] + ez && p.r <= b.max[0] + er;
         self.tree.visit(near, |i| {
             let piece = &pieces[i as usize];
-            if !decided || piece.on_axis || !near(&piece.bounds) {
+            let bounds = piece.bounds();
+            if !decided || piece.on_axis || !near(&bounds) {
                 return;
             }
-            let within = p.r >= piece.bounds.min[0] - er;
+            let within = p.r >= bounds.min[0] - er;
             if piece.is_horizontal() {
                 // Never crossed; but the point may lie on it.
                 decided = !(within
@@ -123,7 +125,7 @@ impl CrossingSet {
 
     /// Crossings in double-double, and whether any piece passes through the point. Such pieces count
     /// as passed, all alike, so that a path there and back changes nothing.
-    pub(crate) fn count_exact(&self, pieces: &[Piece], r: Dd, z: Dd) -> (Winding, bool) {
+    pub(crate) fn count_exact(&self, pieces: &[Arc<Piece>], r: Dd, z: Dd) -> (Winding, bool) {
         let mut winding = Winding::default();
         let mut on = false;
         let margin = 4.0 * f64::EPSILON;
@@ -167,7 +169,7 @@ impl CrossingSet {
     /// leaving out piece `skip` and those within `coincident` of `from`, which are returned apart.
     pub(crate) fn count_beyond(
         &self,
-        pieces: &[Piece],
+        pieces: &[Arc<Piece>],
         c: usize,
         v: Dd,
         from: Dd,
@@ -198,25 +200,6 @@ impl CrossingSet {
                 }
             },
         );
-    }
-}
-
-/// The boundary of a filled region with its crossings: an even-odd membership of its own.
-#[derive(Debug, Clone)]
-pub(crate) struct ClosedSection {
-    pieces: Vec<Piece>,
-    crossings: CrossingSet,
-}
-
-impl ClosedSection {
-    pub(crate) fn new(pieces: Vec<Piece>) -> Self {
-        let crossings = CrossingSet::new(&pieces);
-        Self { pieces, crossings }
-    }
-
-    /// Whether the boundary passes through the point.
-    pub(crate) fn meets(&self, r: Dd, z: Dd) -> bool {
-        self.crossings.count_exact(&self.pieces, r, z).1
     }
 }
 

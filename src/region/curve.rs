@@ -69,7 +69,7 @@ pub(crate) struct Bezier {
 }
 
 impl Bezier {
-    fn segment(a: [Dd; 2], b: [Dd; 2], interval: [f64; 2]) -> Self {
+    pub(super) fn segment(a: [Dd; 2], b: [Dd; 2], interval: [f64; 2]) -> Self {
         let lift = |p: [Dd; 2]| [p[0], p[1], Dd::ONE];
         Self {
             points: vec![lift(a), lift(b)],
@@ -100,6 +100,15 @@ pub(crate) fn breaks(curve: &ProfileCurve) -> Vec<f64> {
             .collect(),
         ProfileCurve::Reversed(inner) => breaks(inner),
         _ => Vec::new(),
+    }
+}
+
+/// The points of a polyline, and whether it runs backwards.
+pub(crate) fn polyline(curve: &ProfileCurve) -> Option<(&[[f64; 2]], bool)> {
+    match curve {
+        ProfileCurve::Polyline { points } => Some((points, false)),
+        ProfileCurve::Reversed(inner) => polyline(inner).map(|(points, back)| (points, !back)),
+        _ => None,
     }
 }
 

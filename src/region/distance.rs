@@ -23,6 +23,7 @@ use crate::math::bernstein::{self, Coefficients};
 use crate::math::{Dd, Real};
 use rayon::prelude::*;
 use smallvec::SmallVec;
+use std::borrow::Cow;
 
 /// A piece made ready for distances.
 #[derive(Debug, Clone)]
@@ -69,9 +70,19 @@ impl DistanceSet {
     pub(crate) fn new<'a>(pieces: impl Iterator<Item = &'a Piece>) -> Self {
         let pieces: Vec<&Piece> = pieces.collect();
         let parts = pieces.par_iter().flat_map_iter(|piece| parts(piece));
-        // One ulp of the unit square covers the rounding of the corners.
-        let arcs = parts.map(|part| (Arc::new(&part), part.bounds.grown(f64::EPSILON)));
-        let (arcs, boxes): (Vec<Arc>, Vec<Box2>) = arcs.unzip();
+        let (arcs, boxes) = parts.map(|part| boxed(&part)).unzip();
+        Self::of(arcs, boxes)
+    }
+
+    /// [`new`](Self::new) by the calling thread alone.
+    pub(crate) fn in_turn<'a>(pieces: impl Iterator<Item = &'a Piece>) -> Self {
+        let (arcs, boxes) = pieces.flat_map(parts).map(|part| boxed(&part)).unzip();
+        Self::of(arcs, boxes)
+    }
+
+    fn of(mut arcs: Vec<Arc>, mut boxes: Vec<Box2>) -> Self {
+        arcs.shrink_to_fit();
+        boxes.shrink_to_fit();
         let tree = BoxTree::new(&boxes);
         Self { arcs, boxes, tree }
     }
@@ -144,10 +155,15 @@ impl DistanceSet {
     }
 }
 
+/// A piece with the box around it.
+fn boxed(piece: &Piece) -> (Arc, Box2) {
+    // One ulp of the unit square covers the rounding of the corners.
+    (Arc::new(piece), piece.bounds().grown(f64::EPSILON))
+}
+
 /// The parts of a piece that get a box each.
-fn parts(piece: &Piece) -> impl Iterator<Item = Piece> {
-    let closed_form = piece.degree() == 1 || piece.circle.is_some();
-    let parts = if closed_form { 1 } else { PARTS };
+fn parts(piece: &Piece) -> impl Iterator<Item = Cow<'_, Piece>> {
+    let parts = if piece.is_rational() { PARTS } else { 1 };
     let cut = move |i: u32| Dd::of(f64::from(i)) / Dd::of(f64::from(parts));
     let point = move |k: u32| match k {
         0 => piece.start,
@@ -160,9 +176,9 @@ fn parts(piece: &Piece) -> impl Iterator<Item = Piece> {
             return None;
         }
         Some(if parts == 1 {
-            piece.clone()
+            Cow::Borrowed(piece)
         } else {
-            piece.part(cut(i), cut(i + 1), start, end)
+            Cow::Owned(piece.part(cut(i), cut(i + 1), start, end))
         })
     })
 }
@@ -179,7 +195,7 @@ impl Arc {
                 direction,
                 length_squared: direction[0] * direction[0] + direction[1] * direction[1],
             }
-        } else if let Some((centre, radius)) = piece.circle {
+        } else if let Some((centre, radius)) = piece.circle() {
             Shape::Circle {
                 centre: relative(centre),
                 radius: radius.f64(),
@@ -341,8 +357,7 @@ impl Rational {
     fn new(piece: &Piece, middle: [f64; 2]) -> Self {
         let coordinate = |c: usize| -> Coefficients<Dd> {
             piece
-                .points
-                .iter()
+                .points()
                 .map(|p| {
                     if c < 2 {
                         p[c] - Dd::of(middle[c]) * p[2]
@@ -353,7 +368,7 @@ impl Rational {
                 .collect()
         };
         // Weights near 1, by a power of two.
-        let largest = piece.points.iter().fold(0.0_f64, |m, p| m.max(p[2].f64()));
+        let largest = piece.points().fold(0.0_f64, |m, p| m.max(p[2].f64()));
         let power = (-largest.log2().floor()).exp2();
         let [r, z, w] = [0, 1, 2].map(|c| -> Coefficients<Dd> {
             coordinate(c)

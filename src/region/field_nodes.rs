@@ -108,6 +108,11 @@ impl Nodes {
             Node::Leaf(n) => Node::Leaf(n.saturating_add(leaves)),
             Node::Empty => Node::Empty,
         };
+        // Exactly: what doubling would add is more than the rest of the process.
+        self.quarters.reserve_exact(other.quarters.len());
+        self.leaves.reserve_exact(other.leaves.len());
+        self.pool.reserve_exact(other.pool.len());
+        self.eights.reserve_exact(other.eights.len());
         self.quarters
             .extend(other.quarters.iter().map(|four| four.map(moved)));
         self.leaves.extend(other.leaves.iter().map(|leaf| {

@@ -37,8 +37,8 @@ fn are_paired(points: &[Vec<[f64; 3]>], middle: f64, tolerance: f64) -> bool {
 
 /// Control points and weights.
 fn points(piece: &Piece) -> Vec<[f64; 3]> {
-    let point = |&[r, z, w]: &HomogeneousPoint| [(r / w).f64(), (z / w).f64(), w.f64()];
-    piece.points.iter().map(point).collect()
+    let point = |[r, z, w]: HomogeneousPoint| [(r / w).f64(), (z / w).f64(), w.f64()];
+    piece.points().map(point).collect()
 }
 
 fn are_images(piece: &[[f64; 3]], other: &[[f64; 3]], middle: f64, tolerance: f64) -> bool {
@@ -63,7 +63,7 @@ mod tests {
         let heights = || {
             body.boundary()
                 .iter()
-                .flat_map(|b| [b.piece.bounds.min[1], b.piece.bounds.max[1]])
+                .flat_map(|b| [b.piece.bounds().min[1], b.piece.bounds().max[1]])
         };
         let (low, high) = (
             heights().fold(f64::MAX, f64::min),

@@ -129,7 +129,7 @@ impl Frame {
     fn around(boundary: &[BoundaryPiece]) -> Self {
         let mut min = [f64::INFINITY; 2];
         let mut max = [f64::NEG_INFINITY; 2];
-        for b in boundary.iter().map(|b| &b.piece.bounds) {
+        for b in boundary.iter().map(|b| b.piece.bounds()) {
             for c in 0..2 {
                 min[c] = min[c].min(b.min[c]);
                 max[c] = max[c].max(b.max[c]);
@@ -182,7 +182,7 @@ impl Frame {
                 total.values[i] = total.values[i] + if turned { -value } else { value };
                 total.errors[i] += one.errors[i];
             }
-            let b = &part.piece.bounds;
+            let b = &part.piece.bounds();
             variation += (0..2)
                 .map(|c| (b.max[c] - b.min[c]) / self.half[c])
                 .sum::<f64>();
@@ -294,13 +294,13 @@ struct Centred {
 
 impl Centred {
     fn new(frame: &Frame, piece: &Piece) -> Self {
-        let first = piece.points[0][2];
-        let polynomial = piece.points.iter().all(|p| p[2] == first);
+        let first = piece.point(0)[2];
+        let polynomial = piece.points().all(|p| p[2] == first);
         // A power of two brings the largest weight near 1; the curve does not see it.
-        let largest = piece.points.iter().fold(0.0_f64, |m, p| m.max(p[2].f64()));
+        let largest = piece.points().fold(0.0_f64, |m, p| m.max(p[2].f64()));
         let scale = (-largest.log2().floor()).exp2();
         let numerators = [0, 1].map(|c| {
-            let coefficient = |p: &[Dd; 3]| {
+            let coefficient = |p: [Dd; 3]| {
                 if polynomial {
                     frame.centred(p[c] / p[2], c)
                 } else {
@@ -309,12 +309,9 @@ impl Centred {
                     shifted.scale_by_power_of_two(1.0 / frame.half[c])
                 }
             };
-            piece.points.iter().map(coefficient).collect()
+            piece.points().map(coefficient).collect()
         });
-        let weights = piece
-            .points
-            .iter()
-            .map(|p| p[2].scale_by_power_of_two(scale));
+        let weights = piece.points().map(|p| p[2].scale_by_power_of_two(scale));
         Self {
             numerators,
             weights: (!polynomial).then(|| weights.collect()),
@@ -375,18 +372,24 @@ impl Closing {
 
 /// Ends that no piece starts from and starts that no piece ends at, ascending in r and z.
 fn loose(boundary: &[BoundaryPiece]) -> (Vec<[Dd; 2]>, Vec<[Dd; 2]>) {
-    let mut points: Vec<([Dd; 2], i32)> = Vec::with_capacity(2 * boundary.len());
-    for part in boundary {
-        let sign = if part.forward { 1 } else { -1 };
-        points.push((part.piece.start, sign));
-        points.push((part.piece.end, -sign));
-    }
-    points.sort_by(|a, b| compare(a.0, b.0));
+    // By numbers: there may be very many ends, and as a rule none of them is loose.
+    #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
+    let mut order: Vec<u32> = (0..2 * boundary.len() as u32).collect();
+    let end = |i: u32| {
+        let part = &boundary[i as usize / 2];
+        let (point, sign) = if i.is_multiple_of(2) {
+            (part.piece.start, 1)
+        } else {
+            (part.piece.end, -1)
+        };
+        (point, if part.forward { sign } else { -sign })
+    };
+    order.sort_unstable_by(|&a, &b| compare(end(a).0, end(b).0));
     let (mut ends, mut starts) = (Vec::new(), Vec::new());
-    for group in points.chunk_by(|a, b| compare(a.0, b.0) == Ordering::Equal) {
-        let net: i32 = group.iter().map(|p| p.1).sum();
+    for group in order.chunk_by(|&a, &b| compare(end(a).0, end(b).0) == Ordering::Equal) {
+        let net: i32 = group.iter().map(|&i| end(i).1).sum();
         let list = if net < 0 { &mut ends } else { &mut starts };
-        list.extend((0..net.abs()).map(|_| group[0].0));
+        list.extend((0..net.abs()).map(|_| end(group[0]).0));
     }
     (ends, starts)
 }

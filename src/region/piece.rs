@@ -16,6 +16,8 @@ use crate::math::bernstein::{self, Coefficients};
 use crate::math::tolerance::{ON_BOUNDARY, gamma};
 use crate::math::{Dd, Real};
 use std::cmp::Ordering;
+use std::ops::Deref;
+use std::sync::Arc;
 
 /// Where a point lies relative to a piece, looking along +r at the point's height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,33 +36,70 @@ pub(crate) const TABLE: usize = 16;
 /// A part of a curve on which r and z are both monotone.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
-    /// Homogeneous control points.
-    pub(crate) points: Vec<HomogeneousPoint>,
     pub(crate) start: [Dd; 2],
     pub(crate) end: [Dd; 2],
-    pub(crate) loop_index: usize,
+    /// What a piece that is not straight has besides. A profile may have very many straight ones.
+    curve: Option<Box<Curve>>,
+    /// Bound on the rounding of a coordinate that the f64 twin evaluates.
+    error: f64,
+    loop_index: u32,
     /// On r = 0, where nothing is swept.
     pub(crate) on_axis: bool,
+}
+
+/// What makes a piece curved.
+#[derive(Debug, Clone)]
+struct Curve {
+    /// Homogeneous control points.
+    points: Vec<HomogeneousPoint>,
     /// Centre and radius of a circular piece.
-    pub(crate) circle: Option<([Dd; 2], Dd)>,
-    pub(crate) bounds: Box2,
-    pub(crate) twin: Twin,
+    circle: Option<([Dd; 2], Dd)>,
+    /// The point the coefficients are relative to.
+    origin: [f64; 2],
+    /// Coefficients of w (r - origin), w (z - origin) and w.
+    coefficients: [Coefficients<f64>; 3],
+    /// Points at the parameters i / [`TABLE`], relative to the origin; empty until they are asked for.
+    table: Vec<[f64; 2]>,
 }
 
 /// The f64 side of a piece.
-#[derive(Debug, Clone)]
-pub(crate) struct Twin {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Twin<'a> {
     /// The point the coefficients are relative to.
     pub(crate) origin: [f64; 2],
-    /// Coefficients of w (r - origin), w (z - origin) and w.
-    pub(crate) coefficients: [Coefficients<f64>; 3],
     /// Bound on the rounding of an evaluated coordinate.
     pub(crate) error: f64,
-    /// Points at the parameters i / [`TABLE`], relative to the origin; empty for segments.
-    pub(crate) table: Vec<[f64; 2]>,
+    shape: Shape<'a>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Shape<'a> {
+    /// Both ends relative to the origin, by coordinate.
+    Straight([[f64; 2]; 2]),
+    Curved(&'a Curve),
+}
+
+/// Coefficients of one homogeneous coordinate of a [`Twin`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Row<'a> {
+    Two([f64; 2]),
+    Many(&'a [f64]),
+}
+
+impl Deref for Row<'_> {
+    type Target = [f64];
+
+    #[inline]
+    fn deref(&self) -> &[f64] {
+        match self {
+            Self::Two(two) => two,
+            Self::Many(many) => many,
+        }
+    }
 }
 
 impl Piece {
+    /// A piece with those control points; a straight one is the segment between its ends, whatever their weights.
     pub(crate) fn new(
         points: Vec<HomogeneousPoint>,
         start: [Dd; 2],
@@ -68,29 +107,123 @@ impl Piece {
         loop_index: usize,
         circle: Option<([Dd; 2], Dd)>,
     ) -> Self {
+        if points.len() == 2 {
+            return Self::segment(start, end, loop_index);
+        }
         let on_axis = points.iter().all(|p| p[0] == Dd::ZERO);
-        let twin = Twin::new(&points, start);
-        let bounds = Box2::around(start.map(Real::f64), end.map(Real::f64));
+        let origin = start.map(Real::f64);
+        let coefficients = relative(&points, origin);
+        let error = rounding(&coefficients);
         Self {
-            points,
             start,
             end,
-            loop_index,
+            curve: Some(Box::new(Curve {
+                points,
+                circle,
+                origin,
+                coefficients,
+                table: Vec::new(),
+            })),
+            error,
+            loop_index: numbered(loop_index),
             on_axis,
-            circle,
-            bounds,
-            twin,
         }
     }
 
     /// A straight piece.
     pub(crate) fn segment(start: [Dd; 2], end: [Dd; 2], loop_index: usize) -> Self {
-        let points = vec![[start[0], start[1], Dd::ONE], [end[0], end[1], Dd::ONE]];
-        Self::new(points, start, end, loop_index, None)
+        let mut segment = Self {
+            start,
+            end,
+            curve: None,
+            error: 0.0,
+            loop_index: numbered(loop_index),
+            on_axis: start[0] == Dd::ZERO && end[0] == Dd::ZERO,
+        };
+        let twin = segment.twin();
+        segment.error = rounding(&twin.rows());
+        segment
     }
 
     pub(crate) fn degree(&self) -> usize {
-        self.points.len() - 1
+        self.curve.as_ref().map_or(1, |c| c.points.len() - 1)
+    }
+
+    /// Whether it is neither straight nor circular: nothing of it has a closed form.
+    pub(crate) fn is_rational(&self) -> bool {
+        self.curve.as_ref().is_some_and(|c| c.circle.is_none())
+    }
+
+    /// Number of the loop it is of.
+    pub(crate) fn loop_index(&self) -> usize {
+        self.loop_index as usize
+    }
+
+    /// Centre and radius of a circular piece.
+    pub(crate) fn circle(&self) -> Option<([Dd; 2], Dd)> {
+        self.curve.as_ref().and_then(|c| c.circle)
+    }
+
+    /// The box of its ends, which hold all of it.
+    #[inline]
+    pub(crate) fn bounds(&self) -> Box2 {
+        Box2::around(self.start.map(Real::f64), self.end.map(Real::f64))
+    }
+
+    /// A homogeneous control point.
+    pub(crate) fn point(&self, i: usize) -> HomogeneousPoint {
+        match &self.curve {
+            Some(curve) => curve.points[i],
+            None => {
+                let [r, z] = if i == 0 { self.start } else { self.end };
+                [r, z, Dd::ONE]
+            }
+        }
+    }
+
+    /// Its homogeneous control points.
+    pub(crate) fn points(&self) -> impl ExactSizeIterator<Item = HomogeneousPoint> + '_ {
+        (0..self.degree() + 1).map(|i| self.point(i))
+    }
+
+    /// Its f64 side.
+    #[inline]
+    pub(crate) fn twin(&self) -> Twin<'_> {
+        let (origin, shape) = match &self.curve {
+            Some(curve) => (curve.origin, Shape::Curved(curve)),
+            None => {
+                let origin = self.start.map(Real::f64);
+                let from = |p: [Dd; 2], c: usize| (p[c] - Dd::of(origin[c])).f64();
+                let rows = [0, 1].map(|c| [from(self.start, c), from(self.end, c)]);
+                (origin, Shape::Straight(rows))
+            }
+        };
+        Twin {
+            origin,
+            error: self.error,
+            shape,
+        }
+    }
+
+    /// Moves its ends by a rounding.
+    pub(crate) fn with_ends(mut self, start: [Dd; 2], end: [Dd; 2]) -> Self {
+        if self.curve.is_none() {
+            return Self::segment(start, end, self.loop_index());
+        }
+        (self.start, self.end) = (start, end);
+        self
+    }
+
+    /// Takes the points at the parameters i / [`TABLE`] that `of` makes of its coefficients.
+    pub(crate) fn tabulate(
+        &mut self,
+        of: impl FnOnce(usize, &[Coefficients<f64>; 3]) -> Option<Vec<[f64; 2]>>,
+    ) {
+        if let Some(curve) = &mut self.curve
+            && let Some(table) = of(curve.points.len() - 1, &curve.coefficients)
+        {
+            curve.table = table;
+        }
     }
 
     /// Whether z does not change along the piece.
@@ -105,7 +238,7 @@ impl Piece {
 
     /// The coefficients of one homogeneous coordinate.
     fn coordinate(&self, c: usize) -> Coefficients<Dd> {
-        self.points.iter().map(|p| p[c]).collect()
+        self.points().map(|p| p[c]).collect()
     }
 
     /// The point at `t`.
@@ -117,10 +250,10 @@ impl Piece {
     /// The part between two parameters, `a < b`.
     pub(crate) fn part(&self, a: Dd, b: Dd, start: [Dd; 2], end: [Dd; 2]) -> Self {
         let coordinates = [0, 1, 2].map(|c| bernstein::restrict(&self.coordinate(c), a, b));
-        let points = (0..self.points.len())
+        let points = (0..self.degree() + 1)
             .map(|i| [coordinates[0][i], coordinates[1][i], coordinates[2][i]])
             .collect();
-        let mut part = Self::new(points, start, end, self.loop_index, self.circle);
+        let mut part = Self::new(points, start, end, self.loop_index(), self.circle());
         part.on_axis = self.on_axis;
         part
     }
@@ -134,18 +267,19 @@ impl Piece {
         if v == self.end[c] {
             return Dd::ONE;
         }
-        let f: Coefficients<Dd> = self.points.iter().map(|p| p[c] - v * p[2]).collect();
+        let f: Coefficients<Dd> = self.points().map(|p| p[c] - v * p[2]).collect();
         bernstein::bracketed_root(&f, self.rough_parameter(c, v.f64()))
     }
 
     /// A start value for [`parameter_at`](Self::parameter_at): f64 bisection.
     fn rough_parameter(&self, c: usize, v: f64) -> f64 {
-        let v = v - self.twin.origin[c];
+        let twin = self.twin();
+        let v = v - twin.origin[c];
         let rising = self.end[c] > self.start[c];
         let (mut lo, mut hi) = (0.0, 1.0);
         for _ in 0..26 {
             let t = 0.5 * (lo + hi);
-            if (self.twin.at(t)[c] < v) == rising {
+            if (twin.at(t)[c] < v) == rising {
                 lo = t;
             } else {
                 hi = t;
@@ -174,7 +308,7 @@ impl Piece {
     /// Bounds of the other coordinate where coordinate `c` takes the value `v`, which must lie within the piece's range
     /// of it: by f64 alone. `None` where its rounding leaves no bracket.
     pub(crate) fn bracket_at(&self, c: usize, v: Dd) -> Option<[f64; 2]> {
-        let t = &self.twin;
+        let t = self.twin();
         let q = (v - Dd::of(t.origin[c])).f64();
         let error = t.error + 4.0 * f64::EPSILON * q.abs();
         let rising = if self.end[c] > self.start[c] {
@@ -188,13 +322,13 @@ impl Piece {
         let parameter = |i: usize| i as f64 / TABLE as f64;
         let (mut low, mut high) = (0.0_f64, 1.0_f64);
         let (mut below, mut above) = (beyond(t.at(0.0)), beyond(t.at(1.0)));
-        if !t.table.is_empty() {
+        if !t.table().is_empty() {
             let next = t
-                .table
+                .table()
                 .partition_point(|&p| beyond(p) < 0.0)
                 .clamp(1, TABLE);
-            (low, below) = (parameter(next - 1), beyond(t.table[next - 1]));
-            (high, above) = (parameter(next), beyond(t.table[next]));
+            (low, below) = (parameter(next - 1), beyond(t.table()[next - 1]));
+            (high, above) = (parameter(next), beyond(t.table()[next]));
         }
         // Secants, whose older end counts less the better the last one did (Anderson and Björck 1973); bisection where
         // three have not left half of the bracket, as where weights differ by much.
@@ -259,7 +393,7 @@ impl Piece {
     /// Where the point lies, in f64; `None` where the rounding does not decide. `error` bounds the
     /// rounding of `point`, and z must lie within the piece's heights.
     pub(crate) fn position(&self, point: [f64; 2], error: f64) -> Option<Position> {
-        let t = &self.twin;
+        let t = self.twin();
         let q = [point[0] - t.origin[0], point[1] - t.origin[1]];
         let error = error + t.error + 4.0 * f64::EPSILON * (q[0].abs() + q[1].abs());
         let decide = |a: f64, b: f64| {
@@ -299,19 +433,19 @@ impl Piece {
             true => Some((p[1] < q[1]) == rising),
             false => None,
         };
-        if !t.table.is_empty() {
+        if !t.table().is_empty() {
             // The table narrows the bracket to one interval, two where a node is at the height.
             #[allow(clippy::cast_precision_loss, reason = "a small count")]
             let parameter = |i: usize| i as f64 / TABLE as f64;
-            let first_not_below = t.table.partition_point(|&p| below(p) == Some(true));
-            let first_above = t.table.partition_point(|&p| below(p) != Some(false));
+            let first_not_below = t.table().partition_point(|&p| below(p) == Some(true));
+            let first_above = t.table().partition_point(|&p| below(p) != Some(false));
             if first_not_below > 0 {
                 lo = parameter(first_not_below - 1);
-                a = t.table[first_not_below - 1];
+                a = t.table()[first_not_below - 1];
             }
             if first_above <= TABLE {
                 hi = parameter(first_above);
-                b = t.table[first_above];
+                b = t.table()[first_above];
             }
         }
         for step in 0..64 {
@@ -345,16 +479,15 @@ impl Piece {
     pub(crate) fn mapped(&self, k: Dd, h: Dd, d: Dd) -> Self {
         let point = |p: [Dd; 2]| [p[0] * k, p[1] * h + d];
         let points = self
-            .points
-            .iter()
+            .points()
             .map(|p| [p[0] * k, p[1] * h + d * p[2], p[2]])
             .collect();
-        let circle = self.circle.map(|(c, r)| (point(c), r * k));
+        let circle = self.circle().map(|(c, r)| (point(c), r * k));
         let mut mapped = Self::new(
             points,
             point(self.start),
             point(self.end),
-            self.loop_index,
+            self.loop_index(),
             circle,
         );
         mapped.on_axis = self.on_axis;
@@ -366,8 +499,8 @@ impl Piece {
     /// The piece in parts whose weights differ by no more than [`SKEW`], cut in the middle of the
     /// longer extent. A heavy weight crowds most of a piece into parameters next to an end, where
     /// f64 cannot tell them apart; in each part's own parameter it can.
-    pub(crate) fn even_parts(self, parts: &mut Vec<Self>) {
-        let weights = self.points.iter().map(|p| p[2].f64());
+    pub(crate) fn even_parts(self: Arc<Self>, parts: &mut Vec<Arc<Self>>) {
+        let weights = self.points().map(|p| p[2].f64());
         let (low, high) = weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
         let extent = [0, 1].map(|c| (self.end[c] - self.start[c]).f64().abs());
         let c = usize::from(extent[1] >= extent[0]);
@@ -387,7 +520,7 @@ impl Piece {
             self.part(t, Dd::ONE, at, self.end),
         ];
         for half in halves {
-            half.even_parts(parts);
+            Arc::new(half).even_parts(parts);
         }
     }
 }
@@ -405,48 +538,73 @@ pub(crate) fn sign(o: Option<Ordering>) -> i32 {
     }
 }
 
-impl Twin {
-    fn new(points: &[HomogeneousPoint], start: [Dd; 2]) -> Self {
-        let origin = start.map(Real::f64);
-        // A power of two brings the largest weight near 1; the curve does not see it.
-        let largest = points.iter().fold(0.0_f64, |m, p| m.max(p[2].f64()));
-        let power = (-largest.log2().floor()).exp2();
-        let coefficients = [0, 1, 2].map(|c| -> Coefficients<f64> {
-            points
-                .iter()
-                .map(|p| {
-                    if c < 2 {
-                        p[c] - Dd::of(origin[c]) * p[2]
-                    } else {
-                        p[2]
-                    }
-                    .scale_by_power_of_two(power)
-                    .f64()
-                })
-                .collect()
-        });
-        let w = &coefficients[2];
-        let reach = |c: usize| {
-            coefficients[c]
-                .iter()
-                .zip(w)
-                .fold(0.0_f64, |m, (v, w)| m.max((v / w).abs()))
+/// The coefficients of w (r - origin), w (z - origin) and w.
+fn relative(points: &[HomogeneousPoint], origin: [f64; 2]) -> [Coefficients<f64>; 3] {
+    // A power of two brings the largest weight near 1; the curve does not see it.
+    let largest = points.iter().fold(0.0_f64, |m, p| m.max(p[2].f64()));
+    let power = (-largest.log2().floor()).exp2();
+    [0, 1, 2].map(|c| {
+        let coefficient = |p: &HomogeneousPoint| {
+            let relative = if c < 2 {
+                p[c] - Dd::of(origin[c]) * p[2]
+            } else {
+                p[2]
+            };
+            relative.scale_by_power_of_two(power).f64()
         };
-        #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
-        let error = gamma(6.0 * (points.len() as f64) + 8.0) * reach(0).max(reach(1));
-        Self {
-            origin,
-            coefficients,
-            error,
-            table: Vec::new(),
+        points.iter().map(coefficient).collect()
+    })
+}
+
+/// A bound on the rounding of a coordinate that coefficients give.
+fn rounding(coefficients: &[impl Deref<Target = [f64]>; 3]) -> f64 {
+    let w = &coefficients[2];
+    let reach = |c: usize| {
+        let shares = coefficients[c].iter().zip(w.iter());
+        shares.fold(0.0_f64, |m, (v, w)| m.max((v / w).abs()))
+    };
+    #[allow(clippy::cast_precision_loss, reason = "degrees are small")]
+    let roundings = 6.0 * (w.len() as f64) + 8.0;
+    gamma(roundings) * reach(0).max(reach(1))
+}
+
+/// Loops are counted in u32.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "a scene has no such number of loops"
+)]
+fn numbered(loop_index: usize) -> u32 {
+    loop_index as u32
+}
+
+impl<'a> Twin<'a> {
+    /// The coefficients of w (r - origin), w (z - origin) and w.
+    #[inline]
+    pub(crate) fn rows(&self) -> [Row<'a>; 3] {
+        match self.shape {
+            Shape::Straight([r, z]) => [Row::Two(r), Row::Two(z), Row::Two([1.0; 2])],
+            Shape::Curved(curve) => {
+                let [r, z, w] = &curve.coefficients;
+                [Row::Many(r), Row::Many(z), Row::Many(w)]
+            }
+        }
+    }
+
+    /// Points at the parameters i / [`TABLE`], relative to the origin; none of straight pieces.
+    #[inline]
+    fn table(&self) -> &'a [[f64; 2]] {
+        match self.shape {
+            Shape::Straight(_) => &[],
+            Shape::Curved(curve) => &curve.table,
         }
     }
 
     /// The derivative at `t`.
     pub(crate) fn slope(&self, t: f64) -> [f64; 2] {
-        let (w, dw) = bernstein::evaluate_with_derivative(&self.coefficients[2], t);
-        [0, 1].map(|c| {
-            let (v, dv) = bernstein::evaluate_with_derivative(&self.coefficients[c], t);
+        let [r, z, w] = self.rows();
+        let (w, dw) = bernstein::evaluate_with_derivative(&w, t);
+        [r, z].map(|c| {
+            let (v, dv) = bernstein::evaluate_with_derivative(&c, t);
             (dv * w - v * dw) / (w * w)
         })
     }
@@ -454,15 +612,30 @@ impl Twin {
     /// The point at `t`, relative to the origin.
     #[inline]
     pub(crate) fn at(&self, t: f64) -> [f64; 2] {
-        let w = bernstein::evaluate(&self.coefficients[2], t);
-        [0, 1].map(|c| bernstein::evaluate(&self.coefficients[c], t) / w)
+        match self.shape {
+            Shape::Straight(rows) => {
+                let w = bernstein::evaluate(&[1.0; 2], t);
+                rows.map(|c| bernstein::evaluate(&c, t) / w)
+            }
+            Shape::Curved(curve) => {
+                let w = bernstein::evaluate(&curve.coefficients[2], t);
+                [0, 1].map(|c| bernstein::evaluate(&curve.coefficients[c], t) / w)
+            }
+        }
     }
 
     /// One of its coordinates.
     #[inline]
     fn coordinate(&self, c: usize, t: f64) -> f64 {
-        bernstein::evaluate(&self.coefficients[c], t)
-            / bernstein::evaluate(&self.coefficients[2], t)
+        match self.shape {
+            Shape::Straight(rows) => {
+                bernstein::evaluate(&rows[c], t) / bernstein::evaluate(&[1.0; 2], t)
+            }
+            Shape::Curved(curve) => {
+                bernstein::evaluate(&curve.coefficients[c], t)
+                    / bernstein::evaluate(&curve.coefficients[2], t)
+            }
+        }
     }
 }
 

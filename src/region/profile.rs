@@ -12,9 +12,11 @@ use super::piece::{self, Piece, TABLE};
 use super::section::Section;
 use super::weld::welded;
 use crate::math::Side;
+use crate::math::bernstein::Coefficients;
 use crate::math::tolerance::{BELOW_AXIS, GAP};
 use crate::math::{Dd, Real};
 use crate::nurbs::{self, BasisCache, KnotVector};
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 /// Curves in order, head to tail.
@@ -100,7 +102,6 @@ pub struct Region {
     unit: f64,
     size: f64,
     section: Arc<Section>,
-    boundary: Vec<BoundaryPiece>,
     warnings: Vec<String>,
 }
 
@@ -115,25 +116,60 @@ struct Chain {
 
 /// One piece of a loop.
 struct Link {
-    bezier: Bezier,
+    shape: Shape,
     /// Which curve of the loop it is of.
     curve: usize,
     /// Whether the curve may jump where the piece ends.
     breaks: bool,
 }
 
+/// A profile may have very many segments, so they take no more than their numbers.
+enum Shape {
+    /// Part of a polyline, between the points of those numbers.
+    Segment {
+        ends: [[f64; 2]; 2],
+        numbers: [u32; 2],
+    },
+    Curved(Box<Bezier>),
+}
+
+impl Link {
+    fn bezier(&self) -> Cow<'_, Bezier> {
+        match &self.shape {
+            Shape::Segment {
+                ends: [a, b],
+                numbers,
+            } => Cow::Owned(Bezier::segment(
+                a.map(Dd::of),
+                b.map(Dd::of),
+                numbers.map(f64::from),
+            )),
+            Shape::Curved(bezier) => Cow::Borrowed(bezier),
+        }
+    }
+}
+
 impl Chain {
     /// Its image on the other side of the axis.
     fn mirrored(&self) -> Self {
         let mirrored = |link: &Link| {
-            let mut bezier = link.bezier.clone();
-            for point in &mut bezier.points {
-                point[0] = -point[0];
-            }
-            if let Some((centre, _)) = &mut bezier.circle {
-                centre[0] = -centre[0];
-            }
-            Link { bezier, ..*link }
+            let shape = match &link.shape {
+                &Shape::Segment { ends, numbers } => Shape::Segment {
+                    ends: ends.map(|[r, z]| [-r, z]),
+                    numbers,
+                },
+                Shape::Curved(bezier) => {
+                    let mut bezier = bezier.clone();
+                    for point in &mut bezier.points {
+                        point[0] = -point[0];
+                    }
+                    if let Some((centre, _)) = &mut bezier.circle {
+                        centre[0] = -centre[0];
+                    }
+                    Shape::Curved(bezier)
+                }
+            };
+            Link { shape, ..*link }
         };
         Self {
             pieces: self.pieces.iter().map(mirrored).collect(),
@@ -144,23 +180,25 @@ impl Chain {
 /// What pieces bound.
 struct Outline {
     section: Section,
-    boundary: Vec<BoundaryPiece>,
     crossing: Option<[f64; 2]>,
 }
 
 impl Outline {
     /// What the fill rule makes of pieces.
-    fn of(pieces: Vec<Piece>, fill: Fill) -> Result<Self, RegionError> {
+    fn of(pieces: Vec<Arc<Piece>>, fill: Fill) -> Result<Self, RegionError> {
         let found = filled(&pieces, &|w| fill.is_inside(w[0]), &|_| 0, 1)?;
         Ok(Self {
-            section: Section::new(pieces, fill, &found.pieces),
-            boundary: found.pieces,
+            section: Section::new(pieces, fill, found.pieces),
             crossing: found.crossing,
         })
     }
 
     /// The union of what the fill rule makes of each.
-    fn of_both(mut pieces: Vec<Piece>, image: Vec<Piece>, fill: Fill) -> Result<Self, RegionError> {
+    fn of_both(
+        mut pieces: Vec<Arc<Piece>>,
+        image: Vec<Arc<Piece>>,
+        fill: Fill,
+    ) -> Result<Self, RegionError> {
         let one = |w: &[Winding]| fill.is_inside(w[0]);
         // Where a curve crosses its image is no slip.
         let crossing = filled(&pieces, &one, &|_| 0, 1)?.crossing;
@@ -174,8 +212,7 @@ impl Outline {
         };
         let boundary = welded(found.pieces, 2.0 * boundary::SAME_PROFILE).ok_or(tangle)?;
         Ok(Self {
-            section: Section::enclosed(&boundary),
-            boundary,
+            section: Section::enclosed(boundary),
             crossing,
         })
     }
@@ -183,7 +220,7 @@ impl Outline {
 
 /// The boundary of what `inside` accepts of one profile's pieces.
 fn filled(
-    pieces: &[Piece],
+    pieces: &[Arc<Piece>],
     inside: &dyn Fn(&[Winding]) -> bool,
     operand: &dyn Fn(usize) -> usize,
     operands: usize,
@@ -253,8 +290,8 @@ impl Region {
         let given = cuts(&chains);
         let size = profile_size(&given);
         refuse_thin(&given, rules.boundary, unit)?;
-        let whole = |cut: &[Vec<Cut>]| -> Result<Vec<Piece>, RegionError> {
-            let mut pieces = Vec::new();
+        let whole = |cut: &[Vec<Cut>]| -> Result<Vec<Arc<Piece>>, RegionError> {
+            let mut pieces = Vec::with_capacity(cut.iter().map(Vec::len).sum());
             for (i, cuts) in cut.iter().enumerate() {
                 assemble(i, cuts, size, unit, rules, &mut pieces)?;
             }
@@ -262,14 +299,16 @@ impl Region {
             Ok(pieces)
         };
         let pieces = whole(&given)?;
-        let crosses = || lowest(&given) < -BELOW_AXIS * size;
-        let outline = if rules.across == Across::Mirror && crosses() {
+        let crosses = rules.across == Across::Mirror && lowest(&given) < -BELOW_AXIS * size;
+        drop(given);
+        let outline = if crosses {
             let image: Vec<Chain> = chains.iter().map(Chain::mirrored).collect();
             Outline::of_both(pieces, whole(&cuts(&image))?, rules.fill)?
         } else {
+            drop(chains);
             Outline::of(pieces, rules.fill)?
         };
-        if outline.boundary.iter().all(|p| p.piece.on_axis) {
+        if outline.section.boundary().iter().all(|p| p.piece.on_axis) {
             return Err(RegionError::NoArea);
         }
         let warning = outline.crossing.map(|at| {
@@ -281,13 +320,12 @@ impl Region {
         });
         let size = match rules.across {
             Across::Refuse => size,
-            _ => boundary_size(&outline.boundary),
+            _ => boundary_size(outline.section.boundary()),
         };
         Ok(Self {
             unit,
             size,
             section: Arc::new(outline.section),
-            boundary: outline.boundary,
             warnings: warning.into_iter().collect(),
         })
     }
@@ -313,12 +351,14 @@ impl Region {
     /// Number of bi-monotone pieces of the boundary, parts on the axis left out.
     #[must_use]
     pub fn surface_pieces(&self) -> usize {
-        self.boundary.iter().filter(|p| !p.piece.on_axis).count()
+        (self.boundary().iter())
+            .filter(|p| !p.piece.on_axis)
+            .count()
     }
 
     /// Pieces of the boundary of the filled region, parts on the axis included.
     pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
-        &self.boundary
+        self.section.boundary()
     }
 
     /// The region's membership.
@@ -340,52 +380,84 @@ fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain, RegionError> 
     }
     let mut pieces = Vec::new();
     for (i, c) in curves.iter().enumerate() {
-        let made = curve::beziers(c).map_err(|reason| RegionError::Curve {
+        let fault = |reason| RegionError::Curve {
             loop_index,
             curve: i,
             reason,
-        })?;
+        };
+        let beyond =
+            || fault("is beyond what f64 can evaluate; use coordinates nearer to 1".into());
+        if let Some((points, back)) = curve::polyline(c).filter(|(points, _)| points.len() > 1) {
+            if !points.iter().flatten().all(|v| v.is_finite()) {
+                return Err(beyond());
+            }
+            segments(points, back, i, &mut pieces);
+            continue;
+        }
+        let made = curve::beziers(c).map_err(fault)?;
         let finite = made
             .iter()
             .flat_map(|b| b.points.iter().flatten())
             .all(|v| v.f64().is_finite() && v.lo().is_finite());
         if !finite || made.is_empty() {
-            return Err(RegionError::Curve {
-                loop_index,
-                curve: i,
-                reason: "is beyond what f64 can evaluate; use coordinates nearer to 1".into(),
-            });
+            return Err(beyond());
         }
         let breaks = curve::breaks(c);
         pieces.extend(made.into_iter().map(|bezier| Link {
             breaks: breaks.contains(&bezier.interval[1]),
-            bezier,
+            shape: Shape::Curved(Box::new(bezier)),
             curve: i,
         }));
     }
+    pieces.shrink_to_fit();
     Ok(Chain { pieces })
+}
+
+/// The segments of a polyline.
+fn segments(points: &[[f64; 2]], back: bool, curve: usize, pieces: &mut Vec<Link>) {
+    pieces.reserve_exact(points.len() - 1);
+    #[allow(clippy::cast_possible_truncation, reason = "points are counted in u32")]
+    let segment = |i: usize| {
+        let (mut ends, mut numbers) = ([points[i], points[i + 1]], [i as u32, i as u32 + 1]);
+        if back {
+            ends.reverse();
+            numbers.reverse();
+        }
+        Link {
+            shape: Shape::Segment { ends, numbers },
+            curve,
+            breaks: false,
+        }
+    };
+    let count = points.len() - 1;
+    pieces.extend((0..count).map(|k| segment(if back { count - 1 - k } else { k })));
 }
 
 /// Scales everything by a power of two into the unit square; the unit in scene units.
 fn into_unit(chains: &mut [Chain]) -> Result<f64, RegionError> {
     // The unit comes from control points: it only has to bring the numbers near 1.
-    let reach = chains
-        .iter()
-        .flat_map(|c| &c.pieces)
-        .flat_map(|p| &p.bezier.points);
-    let reach = reach.fold(0.0_f64, |m, p| {
-        m.max((p[0] / p[2]).f64().abs())
-            .max((p[1] / p[2]).f64().abs())
+    let reach = chains.iter().flat_map(|c| &c.pieces).map(|link| {
+        let points = link.bezier();
+        let points = points.points.iter();
+        points.fold(0.0_f64, |m, p| {
+            m.max((p[0] / p[2]).f64().abs())
+                .max((p[1] / p[2]).f64().abs())
+        })
     });
+    let reach = reach.fold(0.0_f64, f64::max);
     if !(reach > 0.0 && reach.is_finite()) {
         return Err(RegionError::NoArea);
     }
     let unit = (reach.log2().floor() + 1.0).exp2();
-    for bezier in chains
-        .iter_mut()
-        .flat_map(|c| &mut c.pieces)
-        .map(|p| &mut p.bezier)
-    {
+    for link in chains.iter_mut().flat_map(|c| &mut c.pieces) {
+        let bezier = match &mut link.shape {
+            Shape::Segment { ends, .. } => {
+                // Exact, as every product with a power of two.
+                *ends = ends.map(|p| p.map(|v| v * (1.0 / unit)));
+                continue;
+            }
+            Shape::Curved(bezier) => bezier,
+        };
         for p in &mut bezier.points {
             p[0] = p[0].scale_by_power_of_two(1.0 / unit);
             p[1] = p[1].scale_by_power_of_two(1.0 / unit);
@@ -398,31 +470,41 @@ fn into_unit(chains: &mut [Chain]) -> Result<f64, RegionError> {
     Ok(unit)
 }
 
+/// A parameter and the point there.
+type CutPoint = (Dd, [Dd; 2]);
+
 /// A Bézier piece with its cuts.
 struct Cut<'a> {
-    bezier: &'a Bezier,
-    curve: usize,
-    breaks: bool,
-    at: Vec<(Dd, [Dd; 2])>,
-}
-
-impl Cut<'_> {
-    fn start(&self) -> [Dd; 2] {
-        self.at[0].1
-    }
-    fn end(&self) -> [Dd; 2] {
-        self.at[self.at.len() - 1].1
-    }
+    link: &'a Link,
+    /// Where a curve is cut, its ends included; `None` of segments that are whole.
+    at: Option<Box<[CutPoint]>>,
 }
 
 impl<'a> Cut<'a> {
     fn new(link: &'a Link) -> Self {
-        Self {
-            bezier: &link.bezier,
-            curve: link.curve,
-            breaks: link.breaks,
-            at: piece::cuts(&link.bezier),
+        let whole =
+            matches!(link.shape, Shape::Segment { ends, .. } if ends.iter().all(|p| p[0] >= 0.0));
+        let at = (!whole).then(|| piece::cuts(&link.bezier()).into());
+        Self { link, at }
+    }
+
+    /// Parameters and points of the cuts, both ends included.
+    fn at(&self) -> Cow<'_, [CutPoint]> {
+        match (&self.at, &self.link.shape) {
+            (Some(at), _) => Cow::Borrowed(at),
+            (None, Shape::Segment { ends, .. }) => {
+                let [a, b] = ends.map(|p| p.map(Dd::of));
+                Cow::Owned(vec![(Dd::ZERO, a), (Dd::ONE, b)])
+            }
+            (None, Shape::Curved(bezier)) => Cow::Owned(piece::cuts(bezier)),
         }
+    }
+    fn start(&self) -> [Dd; 2] {
+        self.at()[0].1
+    }
+    fn end(&self) -> [Dd; 2] {
+        let at = self.at();
+        at[at.len() - 1].1
     }
 }
 
@@ -434,15 +516,15 @@ fn cuts(chains: &[Chain]) -> Vec<Vec<Cut<'_>>> {
 
 /// The least r of all.
 fn lowest(loops: &[Vec<Cut>]) -> f64 {
-    let points = loops.iter().flatten().flat_map(|c| &c.at);
-    points.fold(f64::INFINITY, |m, (_, p)| m.min(p[0].f64()))
+    let lowest = |c: &Cut| (c.at().iter()).fold(f64::INFINITY, |m, (_, p)| m.min(p[0].f64()));
+    (loops.iter().flatten().map(lowest)).fold(f64::INFINITY, f64::min)
 }
 
 /// The longer side of the box around a boundary.
 fn boundary_size(boundary: &[BoundaryPiece]) -> f64 {
     let side = |c: usize| {
-        let low = boundary.iter().map(|b| b.piece.bounds.min[c]);
-        let high = boundary.iter().map(|b| b.piece.bounds.max[c]);
+        let low = boundary.iter().map(|b| b.piece.bounds().min[c]);
+        let high = boundary.iter().map(|b| b.piece.bounds().max[c]);
         high.fold(f64::NEG_INFINITY, f64::max) - low.fold(f64::INFINITY, f64::min)
     };
     side(0).max(side(1))
@@ -476,10 +558,12 @@ fn refuse_thin(loops: &[Vec<Cut>], boundary: Boundary, unit: f64) -> Result<(), 
 fn extent(loops: &[Vec<Cut>]) -> [[f64; 2]; 2] {
     let mut min = [f64::INFINITY; 2];
     let mut max = [f64::NEG_INFINITY; 2];
-    for (_, p) in loops.iter().flatten().flat_map(|c| &c.at) {
-        for c in 0..2 {
-            min[c] = min[c].min(p[c].f64());
-            max[c] = max[c].max(p[c].f64());
+    for cut in loops.iter().flatten() {
+        for (_, p) in cut.at().iter() {
+            for c in 0..2 {
+                min[c] = min[c].min(p[c].f64());
+                max[c] = max[c].max(p[c].f64());
+            }
         }
     }
     [min, max]
@@ -492,7 +576,7 @@ fn assemble(
     size: f64,
     unit: f64,
     rules: &Rules,
-    pieces: &mut Vec<Piece>,
+    pieces: &mut Vec<Arc<Piece>>,
 ) -> Result<(), RegionError> {
     let open = loop_index == 0 && rules.boundary == Boundary::ToAxis;
     let allowed = rules.gap * size;
@@ -512,11 +596,11 @@ fn assemble(
         if !(gap <= allowed) {
             let at = a.map(|c| c.f64() * unit);
             let (gap, allowed) = (gap * unit, allowed * unit);
-            return Err(if cut.breaks && !last {
+            return Err(if cut.link.breaks && !last {
                 RegionError::Jump {
                     loop_index,
-                    curve: cut.curve,
-                    parameter: cut.bezier.interval[1],
+                    curve: cut.link.curve,
+                    parameter: cut.link.bezier().interval[1],
                     gap,
                     at,
                     allowed,
@@ -524,8 +608,8 @@ fn assemble(
             } else {
                 RegionError::Gap {
                     loop_index,
-                    curve: cut.curve,
-                    next: next.curve,
+                    curve: cut.link.curve,
+                    next: next.link.curve,
                     gap,
                     at,
                     allowed,
@@ -551,9 +635,9 @@ fn assemble(
     Ok(())
 }
 
-fn push_segment(a: [Dd; 2], b: [Dd; 2], loop_index: usize, pieces: &mut Vec<Piece>) {
+fn push_segment(a: [Dd; 2], b: [Dd; 2], loop_index: usize, pieces: &mut Vec<Arc<Piece>>) {
     if a != b {
-        pieces.push(Piece::segment(a, b, loop_index));
+        pieces.push(Arc::new(Piece::segment(a, b, loop_index)));
     }
 }
 
@@ -564,8 +648,9 @@ fn above_axis(p: [Dd; 2]) -> [Dd; 2] {
 
 /// Refuses a curve that crosses the axis.
 fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), RegionError> {
-    let [u0, u1] = cut.bezier.interval;
-    let lowest = cut.at.iter().min_by(|a, b| {
+    let [u0, u1] = cut.link.bezier().interval;
+    let at = cut.at();
+    let lowest = at.iter().min_by(|a, b| {
         a.1[0]
             .partial_cmp(&b.1[0])
             .expect("coordinates are numbers")
@@ -573,7 +658,7 @@ fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), R
     match lowest {
         Some((t, p)) if p[0].f64() < -BELOW_AXIS * size => Err(RegionError::BelowAxis {
             loop_index,
-            curve: cut.curve,
+            curve: cut.link.curve,
             r: p[0].f64() * unit,
             parameter: u0 + (u1 - u0) * t.f64(),
             allowed: -BELOW_AXIS * size * unit,
@@ -583,17 +668,18 @@ fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), R
 }
 
 /// Adds the bi-monotone pieces of one piece; what is beyond the axis is laid on it, which changes no winding off it.
-fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Piece>) {
-    let whole = Piece::new(
-        cut.bezier.points.clone(),
-        cut.start(),
-        cut.end(),
-        loop_index,
-        cut.bezier.circle,
-    );
-    for w in cut.at.windows(2) {
+fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Arc<Piece>>) {
+    let bezier = cut.link.bezier();
+    let (points, circle) = (bezier.points.clone(), bezier.circle);
+    let whole = Piece::new(points, cut.start(), cut.end(), loop_index, circle);
+    for w in cut.at().windows(2) {
         let ((a, from), (b, to)) = (w[0], w[1]);
-        let middle = whole.at((a + b) * Dd::of(0.5));
+        let middle = if whole.degree() == 1 {
+            // Straight, whatever the weights.
+            [0, 1].map(|c| (from[c] + to[c]) * Dd::of(0.5))
+        } else {
+            whole.at((a + b) * Dd::of(0.5))
+        };
         let below = middle[0] < Dd::ZERO || from[0] <= Dd::ZERO && to[0] <= Dd::ZERO;
         let (start, end) = (above_axis(from), above_axis(to));
         if start == end {
@@ -602,31 +688,29 @@ fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Piece>) {
         if below {
             push_segment([Dd::ZERO, start[1]], [Dd::ZERO, end[1]], loop_index, pieces);
         } else if whole.degree() == 1 {
-            pieces.push(Piece::segment(start, end, loop_index));
+            push_segment(start, end, loop_index, pieces);
         } else {
-            pieces.push(whole.part(a, b, start, end));
+            pieces.push(Arc::new(whole.part(a, b, start, end)));
         }
     }
 }
 
 /// Fills the pieces' tables of points at uniform parameters. All pieces of a degree share one
 /// cached table of basis functions, so a piece costs three contractions of it.
-fn tabulate(pieces: &mut [Piece]) {
+fn tabulate(pieces: &mut [Arc<Piece>]) {
     static CACHE: OnceLock<BasisCache> = OnceLock::new();
     let cache = CACHE.get_or_init(BasisCache::default);
     #[allow(clippy::cast_precision_loss, reason = "a small count")]
     let parameters: [f64; TABLE + 1] = std::array::from_fn(|i| i as f64 / TABLE as f64);
-    for piece in pieces.iter_mut().filter(|p| p.degree() > 1) {
-        let table = KnotVector::bezier(piece.degree())
-            .and_then(|knots| cache.table(&knots, &parameters, 0));
+    // Degrees beyond the cache's do without a table; it only narrows searches.
+    let table = |degree: usize, [wr, wz, w]: &[Coefficients<f64>; 3]| {
+        let knots = KnotVector::bezier(degree).ok()?;
+        let table = cache.table(&knots, &parameters, 0).ok()?;
         let (mut r, mut z) = ([0.0; TABLE + 1], [0.0; TABLE + 1]);
-        let filled = table.and_then(|table| {
-            let [wr, wz, w] = &piece.twin.coefficients;
-            nurbs::tabulate(cache.kernel(), &table, &[wr, wz], w, &mut [&mut r, &mut z])
-        });
-        // Degrees beyond the cache's do without a table; it only narrows searches.
-        if filled.is_ok() {
-            piece.twin.table = r.into_iter().zip(z).map(|(r, z)| [r, z]).collect();
-        }
+        nurbs::tabulate(cache.kernel(), &table, &[wr, wz], w, &mut [&mut r, &mut z]).ok()?;
+        Some(r.into_iter().zip(z).map(|(r, z)| [r, z]).collect())
+    };
+    for piece in pieces.iter_mut().filter_map(Arc::get_mut) {
+        piece.tabulate(table);
     }
 }

@@ -463,16 +463,16 @@ pub(super) mod tests {
         for (name, region) in regions() {
             for voxels in [40.0, 300.0, 2000.0] {
                 let swept = swept(&region);
-                let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
+                let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
                 let top = swept
                     .iter()
-                    .fold(0.0_f64, |m, b| m.max(b.piece.bounds.max[1]));
+                    .fold(0.0_f64, |m, b| m.max(b.piece.bounds().max[1]));
                 let low = swept
                     .iter()
-                    .fold(0.0_f64, |m, b| m.min(b.piece.bounds.min[1]));
+                    .fold(0.0_f64, |m, b| m.min(b.piece.bounds().min[1]));
                 let side = swept
                     .iter()
-                    .fold(0.0_f64, |m, b| m.max(b.piece.bounds.max[0]))
+                    .fold(0.0_f64, |m, b| m.max(b.piece.bounds().max[0]))
                     .max(top - low);
                 let cell = 1.3 * side / voxels;
                 let tolerance = 2.5e-5 * cell;
@@ -573,9 +573,9 @@ pub(super) mod tests {
             ];
             let region = Region::new(&[vec![polyline(&corners)]], Boundary::Closed, Fill::EvenOdd);
             let swept = swept(&region.expect("a region"));
-            let exact = DistanceSet::new(swept.iter().map(|b| &b.piece));
+            let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
             // The region's unit is its own.
-            let furthest = |m: f64, b: &BoundaryPiece| m.max(b.piece.bounds.max[0]);
+            let furthest = |m: f64, b: &BoundaryPiece| m.max(b.piece.bounds().max[0]);
             let cell = swept.iter().fold(0.0, furthest) / (apex + 2000.0);
             let chain = Chain::new(&swept, 2.5e-5 * cell, 1000, true).expect("few arcs");
             let extent = Extent {

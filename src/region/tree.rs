@@ -121,6 +121,7 @@ impl BoxTree {
             work.push((child, from, from + middle));
             work.push((child + 1, from + middle, to));
         }
+        nodes.shrink_to_fit();
         Self { nodes, items }
     }
 

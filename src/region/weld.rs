@@ -6,8 +6,8 @@
 
 use super::boundary::BoundaryPiece;
 use super::piece::Piece;
-use super::tree::Box2;
 use crate::math::{Dd, Real};
+use std::sync::Arc;
 
 /// Ends nearer than this, in the region's unit, are brought together where that leaves no end
 /// alone: along curves that touch, the place where one takes over from the other is known no
@@ -115,18 +115,12 @@ fn odd_vertices(
 }
 
 /// The piece with its ends moved by a rounding; `None` where nothing is left of it.
-fn between(mut piece: Piece, start: [Dd; 2], end: [Dd; 2]) -> Option<Piece> {
+fn between(piece: Arc<Piece>, start: [Dd; 2], end: [Dd; 2]) -> Option<Arc<Piece>> {
     if start == end {
         return None;
     }
     if start == piece.start && end == piece.end {
         return Some(piece);
     }
-    if piece.degree() == 1 {
-        return Some(Piece::segment(start, end, piece.loop_index));
-    }
-    piece.start = start;
-    piece.end = end;
-    piece.bounds = Box2::around(start.map(Real::f64), end.map(Real::f64));
-    Some(piece)
+    Some(Arc::new(Arc::unwrap_or_clone(piece).with_ends(start, end)))
 }

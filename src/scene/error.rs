@@ -102,29 +102,45 @@ impl fmt::Display for InputProblem {
 impl std::error::Error for InputProblem {}
 
 /// A stretch of bytes in one of the texts a scene was made from.
+///
+/// Every value has one, so it is packed: the index of the text in [`Sources`], where the stretch begins, and its length.
+/// Of a longer one the first half MiB is meant, which is more than anybody is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Place {
-    /// Index of the text in [`Sources`].
-    pub(super) source: u32,
-    start: u32,
-    end: u32,
-}
+pub struct Place(u64);
+
+/// Bits of a [`Place`]'s length and of its start, which may be that of the end of a text of
+/// [`MAX_TEXT_BYTES`](super::limits::MAX_TEXT_BYTES).
+const LENGTH_BITS: u32 = 19;
+const START_BITS: u32 = 27;
+const _: () = assert!(super::limits::MAX_TEXT_BYTES < 1 << START_BITS);
+const _: () = assert!(2 * super::limits::MAX_FILES < 1 << (u64::BITS - LENGTH_BITS - START_BITS));
 
 impl Place {
     /// Bytes `span` of text `source`. Texts are at most [`super::MAX_TEXT_BYTES`] long.
     pub(super) fn new(source: u32, span: Range<usize>) -> Self {
-        let narrow = |at| u32::try_from(at).expect("texts are shorter than 4 GiB");
-        Self {
-            source,
-            start: narrow(span.start),
-            end: narrow(span.end.max(span.start)),
-        }
+        let start = span.start.min((1 << START_BITS) - 1);
+        let length = span.end.saturating_sub(start).min((1 << LENGTH_BITS) - 1);
+        Self(((u64::from(source) << START_BITS | start as u64) << LENGTH_BITS) | length as u64)
+    }
+
+    /// Index of its text in [`Sources`].
+    fn source(self) -> usize {
+        low_bits(self.0 >> (START_BITS + LENGTH_BITS), u32::BITS)
     }
 
     /// The bytes of the value in its text.
     pub fn span(self) -> Range<usize> {
-        self.start as usize..self.end as usize
+        let start = low_bits(self.0 >> LENGTH_BITS, START_BITS);
+        start..start + low_bits(self.0, LENGTH_BITS)
     }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "no more than 32 bits are asked for"
+)]
+fn low_bits(packed: u64, bits: u32) -> usize {
+    (packed & ((1 << bits) - 1)) as usize
 }
 
 /// The texts a scene was made from: the scene file, the `--set` arguments, the point files.
@@ -147,11 +163,11 @@ impl Sources {
             text,
             from_set,
         });
-        u32::try_from(self.list.len() - 1).expect("as many texts as arguments and curves")
+        u32::try_from(self.list.len() - 1).expect("as many texts as arguments and files")
     }
 
-    pub(super) fn text(&self, source: u32) -> &str {
-        &self.list[source as usize].text
+    fn text(&self, place: Place) -> &str {
+        &self.list[place.source()].text
     }
 
     pub(super) fn name(&self, source: u32) -> &str {
@@ -160,7 +176,7 @@ impl Sources {
 
     /// The text of a place on one line, at most some sixty characters of it.
     pub fn value_text(&self, place: Place) -> String {
-        let text = self.text(place.source);
+        let text = self.text(place);
         let span = place.span();
         shorten(text.get(span).unwrap_or_default())
     }
@@ -181,12 +197,12 @@ impl Sources {
     ) -> SceneError {
         let found = found.unwrap_or_else(|| self.value_text(place));
         let (line, column) = self.line_and_column(place);
-        let source = &self.list[place.source as usize];
+        let source = &self.list[place.source()];
         SceneError::Input {
             problem: Box::new(InputProblem {
                 source_name: source.name.clone(),
                 from_set: source.from_set,
-                from_file: place.source != 0 && !source.from_set,
+                from_file: place.source() != 0 && !source.from_set,
                 line,
                 column,
                 span: place.span(),
@@ -201,7 +217,7 @@ impl Sources {
 
     /// Line and column of the start of a place, both from 1, the column in characters.
     pub fn line_and_column(&self, place: Place) -> (usize, usize) {
-        let text = self.text(place.source);
+        let text = self.text(place);
         let mut start = place.span().start.min(text.len());
         while !text.is_char_boundary(start) {
             start -= 1;
@@ -214,7 +230,7 @@ impl Sources {
 
     /// `scenes/vase.toml:12:9`, or `--set` and its argument.
     pub fn describe(&self, place: Place) -> String {
-        let source = &self.list[place.source as usize];
+        let source = &self.list[place.source()];
         if source.from_set {
             return source.name.clone();
         }
@@ -224,7 +240,7 @@ impl Sources {
 
     /// `line 12`, or the `--set` that says it: the place as seen from the same scene.
     pub(super) fn describe_line(&self, place: Place) -> String {
-        if self.list[place.source as usize].from_set {
+        if self.list[place.source()].from_set {
             return self.describe(place);
         }
         format!("line {}", self.line_and_column(place).0)

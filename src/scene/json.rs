@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use super::error::{Fault, Place, shorten};
 use super::limits::MAX_DEPTH;
+use super::toml_reader::taken_from;
 use super::value::{Entry, Kind, Value};
 
 /// The byte order mark.
@@ -23,6 +24,7 @@ pub(super) fn from_json(text: &str, source: u32) -> Result<Value, Fault> {
             0
         },
         source,
+        elements: Vec::new(),
     };
     reader.skip_blanks();
     let value = reader.value(0)?;
@@ -38,6 +40,8 @@ struct Reader<'a> {
     /// The byte to read next.
     at: usize,
     source: u32,
+    /// Elements of the arrays that are being read, outermost first.
+    elements: Vec<Value>,
 }
 
 impl Reader<'_> {
@@ -238,11 +242,11 @@ impl Reader<'_> {
 
     fn array(&mut self, depth: usize) -> Result<Kind, Fault> {
         self.at += 1;
-        let mut elements = Vec::new();
+        let outer = self.elements.len();
         self.skip_blanks();
         if self.peek() == Some(b']') {
             self.at += 1;
-            return Ok(Kind::Array(elements.into()));
+            return Ok(Kind::Array(Box::default()));
         }
         loop {
             self.skip_blanks();
@@ -251,15 +255,16 @@ impl Reader<'_> {
                     .unexpected("a json value after the comma")
                     .with_hint(Some("json has no trailing commas".to_owned())));
             }
-            let index = elements.len();
+            let index = self.elements.len() - outer;
             let value = self.value(depth + 1);
-            elements.push(value.map_err(|fault| fault.at_index(index))?);
+            let value = value.map_err(|fault| fault.at_index(index))?;
+            self.elements.push(value);
             self.skip_blanks();
             match self.peek() {
                 Some(b',') => self.at += 1,
                 Some(b']') => {
                     self.at += 1;
-                    return Ok(Kind::Array(elements.into()));
+                    return Ok(Kind::Array(taken_from(&mut self.elements, outer)));
                 }
                 _ => return Err(self.unexpected("`,` or `]`")),
             }

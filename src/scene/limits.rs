@@ -31,6 +31,9 @@ pub(super) const TOML_STACK_BYTES: usize = 64 << 20;
 /// Segments of a `--set` path.
 pub(super) const MAX_SET_SEGMENTS: usize = 32;
 
+/// Files of points and of splines that one scene names.
+pub(super) const MAX_FILES: usize = 100_000;
+
 /// Points read from files by one scene, all curves together, so that a short scene that names one
 /// long file many times stays bounded.
 pub const MAX_FILE_POINTS: usize = 1_000_000;

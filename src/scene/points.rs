@@ -5,9 +5,10 @@
 
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::error::{Fault, Place, Sources};
-use super::limits::{MAX_FILE_POINTS, MAX_MAGNITUDE, MAX_TEXT_BYTES};
+use super::limits::{MAX_FILE_POINTS, MAX_FILES, MAX_MAGNITUDE, MAX_TEXT_BYTES};
 use super::model::PointModel;
 use crate::io::open_regular;
 
@@ -17,6 +18,7 @@ pub(super) struct PointFiles {
     base_dir: PathBuf,
     bytes_left: usize,
     points_left: usize,
+    files_left: usize,
 }
 
 /// The points of a file.
@@ -36,6 +38,7 @@ impl PointFiles {
             base_dir: base_dir.to_owned(),
             bytes_left: MAX_TEXT_BYTES,
             points_left: MAX_FILE_POINTS,
+            files_left: MAX_FILES,
         }
     }
 
@@ -58,11 +61,11 @@ impl PointFiles {
         file: &str,
         place: Place,
         sources: &mut Sources,
-    ) -> Result<(u32, String), Fault> {
+    ) -> Result<(u32, Arc<str>), Fault> {
         let bytes = self.bytes(file, place)?;
         let shown = self.base_dir.join(file).display().to_string();
-        let text = match String::from_utf8(bytes) {
-            Ok(text) => text,
+        let text: Arc<str> = match String::from_utf8(bytes) {
+            Ok(text) => text.into(),
             Err(error) => {
                 let at = error.utf8_error().valid_up_to();
                 let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
@@ -74,12 +77,17 @@ impl PointFiles {
                 ));
             }
         };
-        let source = sources.add(shown, text.as_str().into(), false);
+        let source = sources.add(shown, text.clone(), false);
         Ok((source, text))
     }
 
     /// Reads `file`, which the scene names at `place`.
     pub(super) fn bytes(&mut self, file: &str, place: Place) -> Result<Vec<u8>, Fault> {
+        let Some(left) = self.files_left.checked_sub(1) else {
+            let wanted = format!("at most {MAX_FILES} files in a scene");
+            return Err(Fault::value(place, wanted));
+        };
+        self.files_left = left;
         let path = self.base_dir.join(file);
         let shown = path.display().to_string();
         let unreadable = |error| Fault::read(place, shown.clone(), error);
@@ -150,12 +158,18 @@ fn parse(text: &str, source: u32, limit: usize) -> Result<FilePoints, Fault> {
             if numbers[2] <= 0.0 {
                 return Err(Fault::value(places[2], super::fields::WEIGHT));
             }
-            weight_place.get_or_insert(places[2]);
+            if weight_place
+                .replace(weight_place.unwrap_or(places[2]))
+                .is_none()
+            {
+                weights = vec![1.0; points.len() - 1];
+            }
             weights.push(numbers[2]);
-        } else {
+        } else if weight_place.is_some() {
             weights.push(1.0);
         }
     }
+    points.shrink_to_fit();
     let end = Place::new(source, text.len()..text.len());
     if points.is_empty() {
         return Err(Fault::found(

@@ -27,6 +27,7 @@ use crate::math::bernstein;
 use crate::math::{Dd, Real};
 use crate::nurbs::{KnotVector, NurbsError, NurbsSurface, NurbsVolume, OrientationError};
 use crate::region::{Piece, Region};
+use std::sync::Arc;
 
 /// Share of the region's size within which heights, and ends of curves, are one.
 const SAME: f64 = 1e-12;
@@ -113,7 +114,7 @@ fn mapped(
 
 /// A piece of the boundary along which z rises.
 struct Side {
-    piece: Piece,
+    piece: Arc<Piece>,
     /// Whether the region is at its left.
     right: bool,
     heights: [f64; 2],
@@ -258,7 +259,7 @@ impl Slabs {
         let [from, to] = range.map(|level| self.parameter(side, level));
         let (low, high) = if from < to { (from, to) } else { (to, from) };
         let column = |k: usize| -> Vec<Dd> {
-            let all: Vec<Dd> = side.piece.points.iter().map(|p| p[k]).collect();
+            let all: Vec<Dd> = side.piece.points().map(|p| p[k]).collect();
             let mut part = bernstein::restrict(&all, low, high).to_vec();
             if to < from {
                 part.reverse();

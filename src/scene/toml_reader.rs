@@ -1,7 +1,7 @@
 //! TOML with the place of every value, in little more memory than the values themselves.
 //!
 //! TOML 1.1 (so 1.0, too), read in one pass: no list of tokens or events comes between the text and the tree. An element
-//! of an array takes 40 bytes, whatever it is written with. Keys are unique; nesting is at most [`MAX_DEPTH`] deep, so the
+//! of an array takes 32 bytes, whatever it is written with. Keys are unique; nesting is at most [`MAX_DEPTH`] deep, so the
 //! recursion is. A number beyond the range of f64 becomes infinite here and is refused by the key that reads it.
 //!
 //! Tables are made as the specification has it: a header makes its table and may stand once, `[[header]]` adds one to
@@ -65,6 +65,15 @@ pub(super) fn lone_value(text: &str, source: u32, offset: usize) -> Result<Value
     match reader.peek() {
         None => Ok(value),
         Some(_) => Err(reader.unexpected("the end of the value")),
+    }
+}
+
+/// What is above the first `outer` values.
+pub(super) fn taken_from(values: &mut Vec<Value>, outer: usize) -> Box<[Value]> {
+    match outer {
+        // Many are not copied.
+        0 => std::mem::take(values).into(),
+        _ => values.drain(outer..).collect(),
     }
 }
 
@@ -246,6 +255,9 @@ struct Reader<'a> {
     /// Where the text begins among the bytes of the source.
     offset: usize,
     tables: usize,
+    /// Elements of the arrays that are being read, outermost first. Room that each of them kept for itself would lie
+    /// waste among the values.
+    elements: Vec<Value>,
 }
 
 impl<'a> Reader<'a> {
@@ -256,6 +268,7 @@ impl<'a> Reader<'a> {
             source,
             offset,
             tables: 0,
+            elements: Vec::new(),
         }
     }
 
@@ -552,13 +565,14 @@ impl<'a> Reader<'a> {
 
     fn array(&mut self, depth: usize) -> Result<Kind, Refusal> {
         self.at += 1;
-        let mut elements = Vec::new();
+        let outer = self.elements.len();
         loop {
             self.skip_lines()?;
             if self.peek() == Some(b']') {
                 break;
             }
-            elements.push(self.value(depth + 1)?);
+            let element = self.value(depth + 1)?;
+            self.elements.push(element);
             self.skip_lines()?;
             match self.peek() {
                 Some(b',') => self.at += 1,
@@ -567,7 +581,7 @@ impl<'a> Reader<'a> {
             }
         }
         self.at += 1;
-        Ok(Kind::Array(elements.into_boxed_slice()))
+        Ok(Kind::Array(taken_from(&mut self.elements, outer)))
     }
 
     fn inline_table(&mut self, depth: usize) -> Result<Kind, Refusal> {

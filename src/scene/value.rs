@@ -31,7 +31,7 @@ pub(super) enum Kind {
 }
 
 // Arrays of a million numbers are nothing out of the way.
-const _: () = assert!(size_of::<Value>() <= 40);
+const _: () = assert!(size_of::<Value>() <= 32);
 
 /// A key and its value.
 #[derive(Debug, Clone)]

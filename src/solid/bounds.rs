@@ -57,14 +57,14 @@ fn support(boundary: &[BoundaryPiece], a: Dd, m: Dd) -> Dd {
         return best;
     }
     for piece in boundary.iter().map(|b| &b.piece).filter(|p| p.degree() > 1) {
-        let b = &piece.bounds;
+        let b = &piece.bounds();
         let (af, mf) = (a.f64(), m.f64());
         let corner = (af * b.min[1]).max(af * b.max[1]) + (mf * b.min[0]).max(mf * b.max[0]);
         if corner < best.f64() {
             continue;
         }
-        let f: Coefficients<Dd> = piece.points.iter().map(|p| a * p[1] + m * p[0]).collect();
-        let w: Coefficients<Dd> = piece.points.iter().map(|p| p[2]).collect();
+        let f: Coefficients<Dd> = piece.points().map(|p| a * p[1] + m * p[0]).collect();
+        let w: Coefficients<Dd> = piece.points().map(|p| p[2]).collect();
         let scale = bernstein::magnitude(&f) * bernstein::magnitude(&w);
         let turning = bernstein::quotient_derivative(&f, &w);
         for t in bernstein::sign_change_parameters(&turning, scale) {

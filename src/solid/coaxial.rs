@@ -6,7 +6,9 @@ use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::similarity::{DdVec, dot};
 use crate::math::{Dd, Real, Similarity};
-use crate::region::{MOST_MEETINGS, Piece, SAME_FACE, Section, Winding, filled_boundary, welded};
+use crate::region::{
+    BoundaryPiece, MOST_MEETINGS, Piece, SAME_FACE, Section, Winding, filled_boundary, welded,
+};
 use std::sync::Arc;
 
 /// A map between half-planes of one axis: `r -> k r`, `z -> h z + d`.
@@ -128,7 +130,7 @@ impl Combination<'_> {
             return Joined::Tangled;
         };
         let frame = self.frame(parts);
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut pieces: Vec<Arc<Piece>> = Vec::new();
         let mut owner = Vec::new();
         for (slot, &(_, i)) in self.steps.iter().enumerate() {
             let Some((region, body)) = parts[i].turned() else {
@@ -137,7 +139,8 @@ impl Combination<'_> {
             let Some(Along { k, h, d }) = along(&frame, body.frame()) else {
                 return Joined::Tangled;
             };
-            pieces.extend(region.boundary().iter().map(|b| b.piece.mapped(k, h, d)));
+            let mapped = |b: &BoundaryPiece| Arc::new(b.piece.mapped(k, h, d));
+            pieces.extend(region.boundary().iter().map(mapped));
             owner.resize(pieces.len(), slot);
         }
         let holds = |w: &[Winding]| self.holds(w);
@@ -151,10 +154,10 @@ impl Combination<'_> {
         let Some(boundary) = welded(outcome.pieces, 2.0 * SAME_FACE) else {
             return Joined::Tangled;
         };
-        let section = Arc::new(Section::enclosed(&boundary));
+        let section = Arc::new(Section::enclosed(boundary));
         let turn = turned.turn().clone();
         Joined::Solid(Arc::new(Body::Revolved(Revolved::new(
-            frame, turn, section, boundary,
+            frame, turn, section,
         ))))
     }
 

@@ -302,7 +302,6 @@ fn unit_ball() -> Option<Revolved> {
         frame.with_local_unit(region.unit()),
         Turn::Full,
         region.section().clone(),
-        region.boundary().to_vec(),
     ))
 }
 

@@ -389,13 +389,13 @@ impl Revolved {
             if sign == 0.0 || piece.on_axis {
                 return;
             }
-            let low = piece.bounds.min[1].max(z + bottom);
-            let high = piece.bounds.max[1].min(z + top);
+            let low = piece.bounds().min[1].max(z + bottom);
+            let high = piece.bounds().max[1].min(z + top);
             if low >= high {
                 return;
             }
             // Beyond the voxel the disc takes the whole polygon.
-            let beyond = piece.bounds.min[0] >= far;
+            let beyond = piece.bounds().min[0] >= far;
             let area = |r: f64, height: f64| match &fixed {
                 Some(sections) => disc_area(sections, r),
                 None => disc_area(&cell.sections(slab, height), r),
@@ -536,8 +536,8 @@ impl<'a> Stretch<'a> {
     /// The radius and height at a parameter.
     fn point(&self, t: f64) -> [f64; 2] {
         let piece = &self.part.piece;
-        let p = piece.twin.at(t);
-        [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]]
+        let p = piece.twin().at(t);
+        [p[0] + piece.twin().origin[0], p[1] + piece.twin().origin[1]]
     }
 
     /// Parameters at which the radius takes one of the values.
@@ -550,13 +550,13 @@ impl<'a> Stretch<'a> {
     /// Parameters at which the circle touches one of the lines or passes a point in which two meet; `z` is the height of
     /// the voxel's centre.
     fn at_lines(&self, lines: &Lines, z: f64) -> Cuts {
-        let [r, h, w] = &self.part.piece.twin.coefficients;
-        let origin = self.part.piece.twin.origin;
+        let twin = self.part.piece.twin();
+        let ([r, h, w], origin) = (twin.rows(), twin.origin);
         let plus = |a: &[f64], b: &[f64], times: f64| -> Coefficients<f64> {
             a.iter().zip(b).map(|(a, b)| a + times * b).collect()
         };
         // Numerators of the radius and of the height above the voxel's centre.
-        let (r, h) = (plus(r, w, origin[0]), plus(h, w, origin[1] - z));
+        let (r, h) = (plus(&r, &w, origin[0]), plus(&h, &w, origin[1] - z));
         let mut cuts = Cuts::new();
         let mut zeros = |numerator: &[f64]| {
             let part = bernstein::restrict(numerator, self.from, self.to);
@@ -602,8 +602,8 @@ impl<'a> Stretch<'a> {
         ends.push(self.from);
         ends.push(self.to);
         ends.sort_by(f64::total_cmp);
-        let [r, z, w] = &piece.twin.coefficients;
-        let origin = piece.twin.origin;
+        let twin = piece.twin();
+        let ([r, z, w], origin) = (twin.rows(), twin.origin);
         let linear = piece.degree() == 1;
         let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
         let integrand = |t: f64| {
@@ -611,9 +611,9 @@ impl<'a> Stretch<'a> {
                 let dz = end[1] - start[1];
                 return area(start[0] + (end[0] - start[0]) * t, start[1] + dz * t) * dz.abs();
             }
-            let (r, _) = bernstein::evaluate_with_derivative(r, t);
-            let (z, dz) = bernstein::evaluate_with_derivative(z, t);
-            let (w, dw) = bernstein::evaluate_with_derivative(w, t);
+            let (r, _) = bernstein::evaluate_with_derivative(&r, t);
+            let (z, dz) = bernstein::evaluate_with_derivative(&z, t);
+            let (w, dw) = bernstein::evaluate_with_derivative(&w, t);
             area(r / w + origin[0], z / w + origin[1]) * ((dz * w - z * dw) / (w * w)).abs()
         };
         ends.windows(2)
@@ -673,8 +673,8 @@ fn parameter(part: &BoundaryPiece, c: usize, v: f64) -> f64 {
     if piece.degree() == 1 {
         return (v - start) / (end - start);
     }
-    let target = v - piece.twin.origin[c];
-    let off = |t: f64| piece.twin.at(t)[c] - target;
+    let target = v - piece.twin().origin[c];
+    let off = |t: f64| piece.twin().at(t)[c] - target;
     illinois(&off, 0.0, 1.0, off(0.0), off(1.0))
 }
 

@@ -54,8 +54,8 @@ impl Part {
         turn: Turn,
     ) -> Self {
         let frame = frame.with_local_unit(region.unit());
-        let (section, boundary) = (region.section().clone(), region.boundary().to_vec());
-        let body = Body::Revolved(Revolved::new(frame, turn, section, boundary));
+        let section = region.section().clone();
+        let body = Body::Revolved(Revolved::new(frame, turn, section));
         Self {
             region: Some(region),
             ..Self::new(name, material, body)

@@ -182,8 +182,8 @@ impl Patches {
         });
         let turned = nets.turned.as_ref().map(|(region, turn)| {
             let frame = frame.with_local_unit(region.unit());
-            let (section, boundary) = (region.section().clone(), region.boundary().to_vec());
-            Revolved::new(frame, turn.clone(), section, boundary)
+            let section = region.section().clone();
+            Revolved::new(frame, turn.clone(), section)
         });
         Self {
             margin: 1e-9 * bounds.longest_side(),

@@ -133,7 +133,7 @@ fn turned(
         };
         !carried
     };
-    let pieces = other.boundary().iter().map(|b| &b.piece);
+    let pieces = other.boundary().iter().map(|b| &*b.piece);
     let swept: Vec<&Piece> = pieces.clone().filter(|p| !p.on_axis).collect();
     let left: Vec<&Piece> = swept.iter().copied().filter(|&p| keeps(p)).collect();
     let mut caps = [false; 2];
@@ -183,7 +183,7 @@ impl Carrier {
 
 /// The curve that carries a piece; `None` of a free-form one.
 fn carrier(piece: &Piece) -> Option<Carrier> {
-    if let Some((centre, radius)) = piece.circle {
+    if let Some((centre, radius)) = piece.circle() {
         return Some(Carrier::Circle {
             centre: centre.map(Real::f64),
             radius: radius.f64(),
@@ -221,7 +221,7 @@ fn sweep_the_same(
     }
     let mine = &own.boundary()[patch.number].piece;
     let points = |of: &Piece, source: &Revolved, target: &Revolved| -> Vec<[f64; 2]> {
-        let twin = &of.twin;
+        let twin = of.twin();
         let shares = (0..=2 * PROBES).map(|k| f64::from(k) / f64::from(2 * PROBES));
         let at = shares.map(|t| {
             let p = twin.at(t);

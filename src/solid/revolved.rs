@@ -15,9 +15,9 @@ use super::turn::{Turn, Wedge};
 use crate::math::Side;
 use crate::math::similarity::DdVec;
 use crate::math::{Aabb, Real, Similarity};
-use crate::region::{BoundaryPiece, Box2, BoxTree, DistanceSet, MeridianPoint, Section};
+use crate::region::{BoundaryPiece, Box2, DistanceSet, MeridianPoint, Piece, Section};
 use glam::{DVec2, DVec3};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The boundary of a solid of revolution in space.
 #[derive(Debug, Clone)]
@@ -26,12 +26,13 @@ pub struct Revolved {
     frame: Similarity,
     turn: Turn,
     section: Arc<Section>,
-    boundary: Vec<BoundaryPiece>,
-    /// What the boundary sweeps.
-    surface: DistanceSet,
-    /// The edges of the caps: the boundary with its parts on the axis.
-    edges: DistanceSet,
-    tree: BoxTree,
+    /// What the boundary sweeps. It and the edges are made when they are first asked for where that is little work: not
+    /// every command asks for distances.
+    surface: OnceLock<DistanceSet>,
+    /// The edges of the caps, where they are more than that: the boundary with its parts on the axis.
+    edges: OnceLock<DistanceSet>,
+    /// Whether the boundary has parts on the axis.
+    axial: bool,
     bounds: Aabb,
     /// Far wider than any rounding of the bounds, far narrower than the solid.
     margin: f64,
@@ -39,25 +40,24 @@ pub struct Revolved {
 
 impl Revolved {
     /// A turned section with its boundary, in a frame whose local lengths are in the section's unit.
-    pub(crate) fn new(
-        frame: Similarity,
-        turn: Turn,
-        section: Arc<Section>,
-        boundary: Vec<BoundaryPiece>,
-    ) -> Self {
-        let swept = boundary.iter().filter(|p| !p.piece.on_axis);
-        let surface = DistanceSet::new(swept.map(|p| &p.piece));
-        let edges = DistanceSet::new(boundary.iter().map(|p| &p.piece));
-        let bounds = bounds::bounds(&frame, &turn, &boundary);
-        let boxes: Vec<Box2> = boundary.iter().map(|b| b.piece.bounds).collect();
+    pub(crate) fn new(frame: Similarity, turn: Turn, section: Arc<Section>) -> Self {
+        let boundary = section.boundary();
+        let bounds = bounds::bounds(&frame, &turn, boundary);
+        let axial = boundary.iter().any(|b| b.piece.on_axis);
+        let (surface, edges) = (OnceLock::new(), OnceLock::new());
+        if boundary.iter().any(|b| b.piece.is_rational()) {
+            surface.get_or_init(|| DistanceSet::new(surface_pieces(&section)));
+            if axial && matches!(turn, Turn::Partial(_)) {
+                edges.get_or_init(|| DistanceSet::new(edge_pieces(&section)));
+            }
+        }
         Self {
             frame,
             turn,
             section,
             surface,
             edges,
-            tree: BoxTree::new(&boxes),
-            boundary,
+            axial,
             bounds,
             margin: 1e-9 * bounds.longest_side(),
         }
@@ -164,7 +164,7 @@ impl Revolved {
 
     /// The pieces around the turned region, in its unit.
     pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
-        &self.boundary
+        self.section.boundary()
     }
 
     /// Coordinates along a grid axis of the flat faces normal to it, where the solid's axis is
@@ -174,7 +174,7 @@ impl Revolved {
         if e3[axis].abs() < 1.0 - 1e-15 {
             return Vec::new();
         }
-        let flat = self.boundary.iter().filter(|b| b.piece.is_horizontal());
+        let flat = self.boundary().iter().filter(|b| b.piece.is_horizontal());
         flat.map(|b| {
             self.frame
                 .to_world(DVec3::new(0.0, 0.0, b.piece.start[1].f64()))[axis]
@@ -196,7 +196,7 @@ impl Revolved {
         let rho = p.x.hypot(p.y);
         let limit_here = limit / scale;
         let found = match &self.turn {
-            Turn::Full => self.surface.distance([rho, p.z], limit_here),
+            Turn::Full => self.swept().distance([rho, p.z], limit_here),
             Turn::Partial(wedge) => self.wedge_distance(wedge, p, rho, inside, limit_here),
         };
         if found < limit_here {
@@ -212,7 +212,7 @@ impl Revolved {
         let in_wedge = inside || wedge.contains(flat, 0.0).unwrap_or(true);
         let mut best = limit;
         if in_wedge {
-            best = self.surface.distance([rho, p.z], best);
+            best = self.swept().distance([rho, p.z], best);
         }
         for d in wedge.directions() {
             let (along, across) = (flat.dot(d), flat.perp_dot(d).abs());
@@ -224,7 +224,7 @@ impl Revolved {
                 across
             } else {
                 let room = (best * best - across * across).sqrt();
-                let off = self.edges.distance([along, p.z], room);
+                let off = self.cap_edges().distance([along, p.z], room);
                 if off >= room {
                     // Nothing nearer; the sum of the squares might round to less.
                     continue;
@@ -237,13 +237,21 @@ impl Revolved {
     }
 
     /// What sweeps the surface, in the body's unit.
+    #[inline]
     pub(super) fn swept(&self) -> &DistanceSet {
-        &self.surface
+        // Not in parallel: a thread that waits for its own work must not be the one that makes it.
+        let made = || DistanceSet::in_turn(surface_pieces(&self.section));
+        self.surface.get_or_init(made)
     }
 
     /// The edges of the caps, in the body's unit.
+    #[inline]
     pub(super) fn cap_edges(&self) -> &DistanceSet {
-        &self.edges
+        if !self.axial {
+            return self.swept();
+        }
+        let made = || DistanceSet::in_turn(edge_pieces(&self.section));
+        self.edges.get_or_init(made)
     }
 
     /// Whether the boxes of the pieces that sweep the surface come within `margin` of a box of the
@@ -255,11 +263,11 @@ impl Revolved {
         }
         .grown(margin);
         let mut found = false;
-        self.tree.visit(
+        self.section.boundary_tree().visit(
             |b| b.overlaps(&wanted),
             |i| {
-                let piece = &self.boundary[i as usize].piece;
-                found |= !piece.on_axis && piece.bounds.overlaps(&wanted);
+                let piece = &self.boundary()[i as usize].piece;
+                found |= !piece.on_axis && piece.bounds().overlaps(&wanted);
             },
         );
         found
@@ -271,7 +279,6 @@ impl Revolved {
             self.frame.translated(by),
             self.turn.clone(),
             self.section.clone(),
-            self.boundary.clone(),
         )
     }
 
@@ -297,7 +304,7 @@ impl Revolved {
             Turn::Partial(wedge) => Some(wedge),
         };
         if wedge.is_none_or(|w| inside || w.contains(flat, 0.0).unwrap_or(true))
-            && let Some((d, at)) = self.surface.nearest([rho, p.z])
+            && let Some((d, at)) = self.swept().nearest([rho, p.z])
         {
             offer(d, local(own, at));
         }
@@ -305,7 +312,7 @@ impl Revolved {
             let (along, across) = (flat.dot(d), flat.perp_dot(d).abs());
             if along >= 0.0 && self.section.side_of(along, p.z) != Side::Outside {
                 offer(across, local(d, [along, p.z]));
-            } else if let Some((off, at)) = self.edges.nearest([along, p.z]) {
+            } else if let Some((off, at)) = self.cap_edges().nearest([along, p.z]) {
                 offer(across.hypot(off), local(d, at));
             }
         }
@@ -322,13 +329,23 @@ impl Revolved {
         mut each: impl FnMut(&BoundaryPiece),
     ) {
         let wanted = |b: &Box2| b.max[1] >= low && b.min[1] <= high && b.max[0] >= near;
-        self.tree.visit(wanted, |i| {
-            let part = &self.boundary[i as usize];
-            if wanted(&part.piece.bounds) {
+        self.section.boundary_tree().visit(wanted, |i| {
+            let part = &self.boundary()[i as usize];
+            if wanted(&part.piece.bounds()) {
                 each(part);
             }
         });
     }
+}
+
+/// The pieces that sweep the surface.
+fn surface_pieces(section: &Section) -> impl Iterator<Item = &Piece> {
+    edge_pieces(section).filter(|p| !p.on_axis)
+}
+
+/// The pieces around a cap.
+fn edge_pieces(section: &Section) -> impl Iterator<Item = &Piece> {
+    section.boundary().iter().map(|b| &*b.piece)
 }
 
 /// Distance to a box so far away that its size is below the rounding of the distance.

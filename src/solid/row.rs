@@ -16,6 +16,7 @@ use super::turn::Turn;
 use crate::math::{Dd, Real, Side, Similarity};
 use crate::region::{BoxTree, MeridianPoint, Piece, Section};
 use glam::{DVec2, DVec3};
+use std::sync::Arc;
 
 /// A row of `count` voxel centres from `first`, `step` apart along x, in scene units.
 #[derive(Debug, Clone, Copy)]
@@ -118,7 +119,7 @@ pub(crate) struct RowSurface<'a> {
     pub(crate) frame: &'a Similarity,
     pub(crate) turn: &'a Turn,
     pub(crate) section: &'a Section,
-    pub(crate) pieces: &'a [Piece],
+    pub(crate) pieces: &'a [Arc<Piece>],
     pub(crate) tree: &'a BoxTree,
 }
 
@@ -169,7 +170,8 @@ impl RowSurface<'_> {
             |i| {
                 let piece = &self.pieces[i as usize];
                 if piece.on_axis
-                    || !(zf >= piece.bounds.min[1] - margin && zf <= piece.bounds.max[1] + margin)
+                    || !(zf >= piece.bounds().min[1] - margin
+                        && zf <= piece.bounds().max[1] + margin)
                 {
                     return;
                 }
@@ -280,7 +282,8 @@ impl RowSurface<'_> {
 /// Halves a piece until the parameters at which the row may meet it hold no voxel centre.
 fn search_piece(piece: &Piece, local: &LocalRow, range: [f64; 2], cuts: &mut Cuts) {
     const DEPTH: u32 = 48;
-    let absolute = |p: [f64; 2]| [p[0] + piece.twin.origin[0], p[1] + piece.twin.origin[1]];
+    let twin = piece.twin();
+    let absolute = |p: [f64; 2]| [p[0] + twin.origin[0], p[1] + twin.origin[1]];
     let mut work = smallvec::SmallVec::<[(f64, [f64; 2], f64, [f64; 2], u32); 32]>::new();
     work.push((
         0.0,
@@ -289,7 +292,7 @@ fn search_piece(piece: &Piece, local: &LocalRow, range: [f64; 2], cuts: &mut Cut
         piece.end.map(Real::f64),
         0,
     ));
-    let margin = piece.twin.error + 4.0 * f64::EPSILON;
+    let margin = twin.error + 4.0 * f64::EPSILON;
     while let Some((s, a, t, b, depth)) = work.pop() {
         let min = [a[0].min(b[0]) - margin, a[1].min(b[1]) - margin];
         let max = [a[0].max(b[0]) + margin, a[1].max(b[1]) + margin];
@@ -307,7 +310,7 @@ fn search_piece(piece: &Piece, local: &LocalRow, range: [f64; 2], cuts: &mut Cut
             }
             continue;
         }
-        let p = absolute(piece.twin.at(m));
+        let p = absolute(twin.at(m));
         work.push((s, a, m, p, depth + 1));
         work.push((m, p, t, b, depth + 1));
     }

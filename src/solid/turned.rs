@@ -360,7 +360,6 @@ mod tests {
             frame.with_local_unit(region.unit()),
             turn,
             region.section().clone(),
-            region.boundary().to_vec(),
         ))
     }
 

@@ -224,8 +224,7 @@ impl Job<'_> {
         let pieces = bodies
             .filter_map(|b| Body::revolved(b))
             .flat_map(|b| b.boundary());
-        let list =
-            |b: &BoundaryPiece, c: usize| b.piece.points.iter().map(|p| p[c].f64()).collect();
+        let list = |b: &BoundaryPiece, c: usize| b.piece.points().map(|p| p[c].f64()).collect();
         pieces.map(|b| [0, 1, 2].map(|c| list(b, c))).collect()
     }
 }

@@ -228,7 +228,7 @@ fn revolved(index: usize, body: &Arc<Body>, one: &Revolved, out: &mut Vec<Sheet>
 /// A box around the ring that a piece sweeps.
 fn ring_box(place: &Place, piece: &Piece, scale: f64) -> Aabb {
     let e = place.axes[2];
-    let [low, high] = [piece.bounds.min, piece.bounds.max].map(|p| vec2(p) * scale);
+    let [low, high] = [piece.bounds().min, piece.bounds().max].map(|p| vec2(p) * scale);
     let flat = (DVec3::ONE - e * e).max(DVec3::ZERO);
     let across = DVec3::from_array(flat.to_array().map(f64::sqrt)) * high.x;
     let (a, b) = (place.origin + e * low.y, place.origin + e * high.y);
@@ -249,7 +249,7 @@ impl Profile {
                 length: along.length() * scale,
             };
         }
-        if let Some((centre, radius)) = piece.circle {
+        if let Some((centre, radius)) = piece.circle() {
             let mut centre = vec2(centre.map(Real::f64)) * scale;
             let radius = radius.f64() * scale;
             if centre.x.abs() <= 1e-14 * radius {
@@ -283,7 +283,7 @@ impl Profile {
             }
             Self::Rational { piece, scale, .. } => {
                 let t = rational_foot(piece, q / *scale);
-                let slope = vec2(piece.twin.slope(t)).normalize_or(DVec2::Y);
+                let slope = vec2(piece.twin().slope(t)).normalize_or(DVec2::Y);
                 let normal = DVec2::new(slope.y, -slope.x);
                 (normal.dot(q - rational_at(piece, t) * *scale), normal)
             }
@@ -370,7 +370,7 @@ pub(super) fn over_axis(slope: f64, least: f64) -> f64 {
 }
 
 fn rational_at(piece: &Piece, t: f64) -> DVec2 {
-    vec2(piece.twin.origin) + vec2(piece.twin.at(t))
+    vec2(piece.twin().origin) + vec2(piece.twin().at(t))
 }
 
 /// The parameter of the nearest point of a piece that goes on a little beyond its ends.
@@ -384,9 +384,9 @@ fn rational_foot(piece: &Piece, q: DVec2) -> f64 {
     let mut t = nearest.unwrap_or_default();
     for _ in 0..20 {
         let off = rational_at(piece, t) - q;
-        let slope = vec2(piece.twin.slope(t));
+        let slope = vec2(piece.twin().slope(t));
         let h = 1e-6;
-        let bend = (vec2(piece.twin.slope(t + h)) - vec2(piece.twin.slope(t - h))) / (2.0 * h);
+        let bend = (vec2(piece.twin().slope(t + h)) - vec2(piece.twin().slope(t - h))) / (2.0 * h);
         let metric = slope.length_squared();
         let second = metric + off.dot(bend);
         let by = if second > 0.1 * metric {
@@ -407,7 +407,7 @@ fn rational_foot(piece: &Piece, q: DVec2) -> f64 {
 /// The largest curvature of samples of a piece, per unit of its own length.
 fn largest_bend(piece: &Piece) -> f64 {
     const SAMPLES: u32 = 64;
-    let slope = |k: u32| vec2(piece.twin.slope(f64::from(k) / f64::from(SAMPLES)));
+    let slope = |k: u32| vec2(piece.twin().slope(f64::from(k) / f64::from(SAMPLES)));
     let bends = (0..SAMPLES).map(|k| {
         let (a, b) = (slope(k), slope(k + 1));
         let length = 0.5 * (a.length() + b.length()) / f64::from(SAMPLES);
