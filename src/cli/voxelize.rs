@@ -232,7 +232,7 @@ fn fraction_error(arguments: &Voxelize) -> Result<Option<f64>, Failure> {
     const ALLOWED: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
     match arguments.fraction_error {
         Some(error) if !ALLOWED.contains(&error) => Err(Failure::usage(format!(
-            "--fraction-error: {error} is not between 1e-14 and 1e-2, shares of a voxel"
+            "--fraction-error: {error:e} is not between 1e-14 and 1e-2, shares of a voxel"
         ))),
         error => Ok(error),
     }

@@ -346,7 +346,7 @@ fn compare(name: &str, text: &str, error: f64, count: usize) -> f64 {
                 worst = (off, *index);
             }
         }
-        println!(
+        eprintln!(
             "{name} {:?} {error:e}: {} voxels of {all}, {integrated} integrated, worst {:.1e} at {:?}, bound {bound:.1e}, sum {off:.1e}",
             grid.dims(),
             partly.len(),
