@@ -174,6 +174,18 @@ fn exit_codes_tell_usage_input_and_files_apart() {
         (2, &["voxelize", &torus, "-o", &out, "--band", "0"]),
         (
             2,
+            &["voxelize", &torus, "-o", &out, "--fraction-error", "0"],
+        ),
+        (
+            2,
+            &["voxelize", &torus, "-o", &out, "--fraction-error", "-1e-9"],
+        ),
+        (
+            2,
+            &["voxelize", &torus, "-o", &out, "--fraction-error", "1e-15"],
+        ),
+        (
+            2,
             &["voxelize", &torus, "-o", &out, "--memory-limit", "lots"],
         ),
         (

@@ -151,6 +151,9 @@ pub(super) struct Voxelize {
     /// Clamp distances to this many voxels on both sides of the surface
     #[arg(long, value_name = "VOXELS", allow_negative_numbers = true)]
     pub(super) band: Option<f64>,
+    /// Error allowed to a fraction, a share of the voxel, 1e-14 to 1e-2 [default: 1e-9]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    pub(super) fraction_error: Option<f64>,
     /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(super) memory_limit: Option<u64>,
@@ -256,7 +259,7 @@ pub(super) struct Validate {
     pub(super) samples: Option<u64>,
     /// Largest distance between triangles and true surface, in scene units; a tenth of the smallest
     /// grid spacing without it
-    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
     pub(super) chord_error: Option<f64>,
     /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
@@ -319,7 +322,7 @@ pub(super) struct Mesh {
     pub(super) output: PathBuf,
     /// Largest distance between mesh and true surface, in scene units; a tenth of the smallest grid
     /// spacing without it
-    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
     pub(super) chord_error: Option<f64>,
     /// Write each solid's own mesh
     #[arg(long)]

@@ -17,7 +17,7 @@ use crate::io::stack::{
 use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{
-    Certainty, Channel, FRACTION_PROMISE, LayerBuffers, LayerSampler, Loose, Selection, Tally,
+    Certainty, Channel, FRACTION_PROMISE, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
 };
 use crate::scene::{
     ChannelModel, ChannelName, CompressionName, FormatName, PARAMETERS, Scene, nearest,
@@ -106,7 +106,18 @@ pub(super) fn run(
         plan.channels.clone(),
         options,
     )?;
-    let (sample, write, tally) = stream(&sampler, &plan, &writer, console)?;
+    let (sample, write, tally, fraction_sum) = stream(&sampler, &plan, &writer, console)?;
+    let Ways {
+        flux,
+        sections,
+        divided,
+    } = tally.ways;
+    tracing::debug!(
+        flux,
+        sections,
+        divided,
+        "voxels whose fractions were integrated"
+    );
     if let Some(warning) = said_of_fractions(&tally) {
         console.warn(&warning);
     }
@@ -115,7 +126,10 @@ pub(super) fn run(
         preview(&scene, &plan, &writer)?;
     }
     let preview = drawn.elapsed().as_secs_f64();
-    let summary = summary(&scene, &plan, &tally);
+    let summary = StackSummary {
+        fraction_sum: plan.selection.fraction.then_some(fraction_sum),
+        ..summary(&scene, &plan, &tally)
+    };
     let placed = Instant::now();
     let manifest = writer.finish(summary)?;
     // The last files on their way to the disk, and the renames.
@@ -218,6 +232,18 @@ fn channels(scene: &Scene, given: &[String]) -> Result<Vec<ChannelModel>, Failur
     })
 }
 
+/// The error that `--fraction-error` allows.
+fn fraction_error(arguments: &Voxelize) -> Result<Option<f64>, Failure> {
+    // Below the first nothing is left of f64, above the second nothing of the fractions.
+    const ALLOWED: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
+    match arguments.fraction_error {
+        Some(error) if !ALLOWED.contains(&error) => Err(Failure::usage(format!(
+            "--fraction-error: {error:e} is not between 1e-14 and 1e-2, shares of a voxel"
+        ))),
+        error => Ok(error),
+    }
+}
+
 fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Failure> {
     let grid = scene.grid()?;
     let output = &scene.model().output;
@@ -229,7 +255,10 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         .collect();
     let wanted: Vec<Channel> = output.channels.iter().filter_map(channel).collect();
     let scalars: Vec<Scalar> = output.channels.iter().filter_map(scalar).collect();
-    let selection = Selection::of(&wanted, scene.band(&grid));
+    let selection = Selection {
+        fraction_error: fraction_error(arguments)?,
+        ..Selection::of(&wanted, scene.band(&grid))
+    };
     if selection.sdf {
         check_f32_range(scene, &grid)?;
     }
@@ -410,7 +439,7 @@ fn stream(
     plan: &Plan,
     writer: &StackWriter,
     console: &Console,
-) -> Result<(f64, f64, Tally), Failure> {
+) -> Result<(f64, f64, Tally, f64), Failure> {
     let workers = plan.workers;
     let layers = plan.grid.dims()[2];
     let bar = console.bar(layers as u64, "layers");
@@ -418,7 +447,7 @@ fn stream(
     let failed = AtomicBool::new(false);
     let failure: Mutex<Option<Error>> = Mutex::new(None);
     let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
-    let tally = Mutex::new(Tally::default());
+    let tally = Mutex::new((Tally::default(), vec![0.0; layers]));
     let has = |name: &str| plan.channels.iter().any(|c| c.name == name);
     let work = |buffers: &mut LayerBuffers, k: usize| -> Result<(), Error> {
         interrupt::check()?;
@@ -441,10 +470,12 @@ fn stream(
         let scalars = names.zip(&buffers.scalars);
         samples.extend(scalars.map(|(c, values)| (c.name.as_str(), Samples::Float(values))));
         writer.write_samples(k, &samples)?;
-        tally
+        let mut all = tally
             .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .add(&buffers.tally);
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        all.0.add(&buffers.tally);
+        all.1[k] = buffers.fraction_sum;
+        drop(all);
         for (total, time) in nanoseconds.iter().zip([sampled - begin, sampled.elapsed()]) {
             total.fetch_add(
                 u64::try_from(time.as_nanos()).unwrap_or(u64::MAX),
@@ -484,10 +515,12 @@ fn stream(
     // Thread time over the number of workers: the share of the wall time each stage took.
     #[allow(clippy::cast_precision_loss, reason = "times and counts")]
     let [sample, write] = nanoseconds.map(|n| n.into_inner() as f64 * 1e-9 / workers as f64);
-    let tally = tally
+    let (tally, sums) = tally
         .into_inner()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
-    Ok((sample, write, tally))
+    // In the order of the layers, whoever sampled them.
+    let fraction_sum = sums.iter().sum();
+    Ok((sample, write, tally, fraction_sum))
 }
 
 /// Draws the preview's two pictures beside the slices; the manifest lists them.

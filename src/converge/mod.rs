@@ -272,8 +272,7 @@ fn layers(looked: Looked<'_>, grid: &GridSpec) -> Result<Vec<Sums>, Error> {
     over_layers(looked, grid, studied(), |k, buffers| {
         let mut sums = Sums {
             inside: buffers.inside,
-            // As stored, in f32.
-            fraction: buffers.fraction.iter().map(|&f| f64::from(f)).sum(),
+            fraction: buffers.fraction_sum,
             ..Sums::default()
         };
         let partial = |f: &&f32| **f > 0.0 && **f < 1.0;

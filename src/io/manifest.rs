@@ -71,8 +71,11 @@ pub struct Manifest {
     pub voxels_inside: Option<u64>,
     /// Volume as `voxels_inside` times the volume of a voxel, in cubed scene units.
     pub volume_occupancy: Option<f64>,
-    /// Volume as the sum of `fraction` times the volume of a voxel, in cubed scene units.
+    /// Volume as the sum of `fraction`, before it was rounded to be stored, times the volume of a voxel, in cubed scene
+    /// units.
     pub volume_fraction: Option<f64>,
+    /// The same of the stored values; `None` in stacks of programs that wrote it as the other.
+    pub volume_fraction_stored: Option<f64>,
     /// Volume of the solid itself, in cubed scene units; `None` where it was not measured.
     pub volume_exact: Option<f64>,
     /// How wrong that may be, in cubed scene units.
@@ -233,6 +236,10 @@ impl Manifest {
         finite("bounds", self.bounds.unwrap_or_default().as_flattened())?;
         finite("volume_occupancy", self.volume_occupancy.as_slice())?;
         finite("volume_fraction", self.volume_fraction.as_slice())?;
+        finite(
+            "volume_fraction_stored",
+            self.volume_fraction_stored.as_slice(),
+        )?;
         finite("volume_exact", self.volume_exact.as_slice())?;
         finite("volume_exact_error", self.volume_exact_error.as_slice())?;
         for material in &self.material_volumes {
@@ -429,6 +436,7 @@ pub(super) mod tests {
             voxels_inside: None,
             volume_occupancy: None,
             volume_fraction: None,
+            volume_fraction_stored: None,
             volume_exact: Some(0.1 + 0.2),
             volume_exact_error: Some(1e-16),
             solids: serde_json::Value::Null,
@@ -481,6 +489,7 @@ pub(super) mod tests {
                 "voxels_inside",
                 "volume_occupancy",
                 "volume_fraction",
+                "volume_fraction_stored",
                 "volume_exact",
                 "volume_exact_error",
                 "solids",

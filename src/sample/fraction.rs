@@ -1,15 +1,23 @@
-//! Volume fractions of a row of voxels.
+//! Volume fractions of a layer of voxels.
 //!
-//! A voxel that no surface touches is 0 or 1: its centre is at least half a diagonal from every
-//! surface. One that a single body touches takes that body's integral. One that several bodies
-//! touch is divided; see the `divided` module.
+//! A turned body, a volume recognised as one too, whose axis is parallel to one of the grid's has its shares from the flux through the voxels' sides
+//! ([`super::flux`]), a layer at a time. Of another body, a voxel whose centre is at least half a diagonal from every
+//! surface is 0 or 1, and one that it touches takes its integral. A voxel that several bodies touch is divided; see the
+//! `divided` module.
 
 use super::divided;
-use super::tally::Loose;
+use super::flux::{FluxSampler, FluxScratch};
+use super::layer::Cancel;
+use super::tally::Tally;
 use crate::grid::GridSpec;
-use crate::math::Side;
+use crate::math::{Kernel, Side};
 use crate::solid::{Assembly, Factor, TOLERANCE, Term, VoxelShape};
 use glam::DVec3;
+
+/// A larger error of the flux gains nothing, and would be seen in the sum.
+const FOR_SUMS: f64 = 1e-9;
+/// Estimates of sections that are asked for less than this take long and gain nothing.
+const LEAST: f64 = 1e-10;
 
 #[derive(Debug)]
 pub(super) struct FractionSampler {
@@ -17,31 +25,98 @@ pub(super) struct FractionSampler {
     shapes: Vec<VoxelShape>,
     /// Half a diagonal in scene units, a hair more.
     reach: f64,
+    /// For each body the flux through the sides of its voxels, where it can be had.
+    fluxes: Vec<Option<FluxSampler>>,
+    /// Estimated error allowed to a stretch of a body's surface in a voxel.
+    tolerance: f64,
+}
+
+/// What one thread reuses.
+#[derive(Debug, Default)]
+pub(super) struct FractionScratch {
+    flux: FluxScratch,
+    /// Shares of each body in a layer, where they are known by the flux.
+    shares: Vec<Option<Vec<f64>>>,
+    /// What they may err by.
+    bound: f64,
 }
 
 impl FractionSampler {
-    pub(super) fn new(assembly: &Assembly, sides: DVec3) -> Self {
-        let shapes = assembly
-            .bodies()
-            .iter()
-            .map(|b| b.voxel_shape(sides))
-            .collect();
+    /// A sampler whose shares are within `error`, where it is the flux that tells.
+    pub(super) fn new(assembly: &Assembly, grid: &GridSpec, error: f64) -> Self {
+        let sides = grid.spacing();
+        let bodies = assembly.bodies().iter();
+        let shapes = bodies.map(|b| b.voxel_shape(sides)).collect();
+        let flux = |b: &std::sync::Arc<crate::solid::Body>| {
+            FluxSampler::new(b.turned_region()?, grid, error.min(FOR_SUMS))
+        };
         Self {
             sides,
             shapes,
             reach: reach(sides),
+            fluxes: assembly.bodies().iter().map(flux).collect(),
+            tolerance: error.clamp(LEAST, TOLERANCE),
         }
     }
 
-    /// Fills one row and returns the sum of its fractions; counts those that are not as near as is promised.
+    /// Fills layer `k` of an assembly that is one body, and returns the sum; `None` where the flux does not tell and
+    /// the rows have to be asked.
+    pub(super) fn layer(
+        &self,
+        how: (Kernel, Option<Cancel<'_>>),
+        (assembly, single): (&Assembly, usize),
+        k: usize,
+        scratch: &mut FractionScratch,
+        out: &mut [f32],
+        tally: &mut Tally,
+    ) -> Option<f64> {
+        let flux = self.fluxes[single].as_ref()?;
+        let body = assembly.bodies()[single].turned_region()?;
+        let filled = flux.layer(how, body, k, &mut scratch.flux, out)?;
+        tally.ways.flux += filled.cut;
+        tally.loose.count_all(filled.cut, filled.bound);
+        Some(filled.sum)
+    }
+
+    /// Finds the shares of each body by itself in layer `k`, where the flux tells.
+    pub(super) fn shares(
+        &self,
+        how: (Kernel, Option<Cancel<'_>>),
+        assembly: &Assembly,
+        (k, voxels): (usize, usize),
+        scratch: &mut FractionScratch,
+    ) {
+        let FractionScratch {
+            flux,
+            shares,
+            bound,
+        } = scratch;
+        shares.resize_with(self.fluxes.len(), || None);
+        *bound = 0.0;
+        for ((sampler, body), shares) in self.fluxes.iter().zip(assembly.bodies()).zip(shares) {
+            let mut values = shares.take().unwrap_or_default();
+            values.resize(voxels, 0.0);
+            let filled = sampler
+                .as_ref()
+                .zip(body.turned_region())
+                .and_then(|(sampler, body)| sampler.layer(how, body, k, flux, &mut values));
+            if let Some(filled) = filled {
+                *bound = bound.max(filled.bound);
+                *shares = Some(values);
+            }
+        }
+    }
+
+    /// Fills one row and returns the sum of its fractions; counts how they were found, and those that are not as near
+    /// as is promised.
     pub(super) fn row(
         &self,
         assembly: &Assembly,
         grid: &GridSpec,
         [j, k]: [usize; 2],
-        sides: &[Vec<Side>],
+        (sides, scratch): (&[Vec<Side>], &FractionScratch),
         out: &mut [f32],
-        loose: &mut Loose,
+        tally: &mut Tally,
     ) -> f64 {
         let bodies = assembly.bodies();
         let step = grid.spacing().x;
@@ -50,9 +125,19 @@ impl FractionSampler {
         let mut clear = vec![0_usize; bodies.len()];
         let mut shares = vec![Share::Nothing; bodies.len()];
         let mut sum = 0.0;
+        let first = j * out.len();
+        let known = |b: usize, i: usize| Some(scratch.shares.get(b)?.as_ref()?[first + i]);
         for (i, value) in out.iter_mut().enumerate() {
             let centre = grid.centre(i, j, k);
             for (b, body) in bodies.iter().enumerate() {
+                if let Some(share) = known(b, i) {
+                    shares[b] = match share {
+                        0.0 => Share::Nothing,
+                        1.0 => Share::All,
+                        _ => Share::Some,
+                    };
+                    continue;
+                }
                 let inside = sides[b][i] != Side::Outside;
                 shares[b] = Share::of(inside);
                 if clear[b] > 0 {
@@ -79,15 +164,24 @@ impl FractionSampler {
                     [] => 0.0,
                     [term] if term.factors.len() == 1 => {
                         let one = term.factors[0];
-                        let shape = &self.shapes[one.body];
-                        let share = bodies[one.body].fraction_within(shape, centre, &[], TOLERANCE);
-                        loose.count(share.error);
-                        let share = share.value;
+                        let share = if let Some(share) = known(one.body, i) {
+                            tally.ways.flux += 1;
+                            tally.loose.count(scratch.bound);
+                            share
+                        } else {
+                            let shape = &self.shapes[one.body];
+                            let body = &bodies[one.body];
+                            let share = body.fraction_within(shape, centre, &[], self.tolerance);
+                            tally.ways.sections += 1;
+                            tally.loose.count(share.error);
+                            share.value
+                        };
                         if one.complement { 1.0 - share } else { share }
                     }
                     several => {
                         let share = divided::share(assembly, several, centre, self.sides);
-                        loose.count(share.error);
+                        tally.ways.divided += 1;
+                        tally.loose.count(share.error);
                         share.value
                     }
                 },
@@ -102,6 +196,11 @@ impl FractionSampler {
             }
         }
         sum
+    }
+
+    /// Whether rows need the sides of a body's voxels.
+    pub(super) fn needs_sides(&self, scratch: &FractionScratch) -> bool {
+        (0..self.fluxes.len()).any(|b| scratch.shares.get(b).is_none_or(Option::is_none))
     }
 }
 

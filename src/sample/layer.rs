@@ -3,10 +3,10 @@
 use super::bits::{self, SideBits};
 use super::body::{Asked, BodySampler, BodyScratch};
 use super::composite::{Composite, CompositeScratch, Limits};
-use super::fraction::FractionSampler;
+use super::fraction::{FractionSampler, FractionScratch};
 use super::memory::Stream;
 use super::radial::{LayerOut, Writing};
-use super::tally::{Certainty, Tally};
+use super::tally::{Certainty, FRACTION_ERROR, Tally};
 use crate::grid::GridSpec;
 use crate::math::Kernel;
 use crate::solid::{Assembly, Body, Part, Scalar};
@@ -40,6 +40,8 @@ pub struct Selection {
     pub material: bool,
     /// Clamp distances to ± this length, in scene units.
     pub band: Option<f64>,
+    /// Error allowed to a fraction, in voxels; [`FRACTION_ERROR`] without it.
+    pub fraction_error: Option<f64>,
 }
 
 impl Selection {
@@ -52,6 +54,7 @@ impl Selection {
             sdf: has(Channel::Sdf),
             material: has(Channel::Material),
             band,
+            fraction_error: None,
         }
     }
 }
@@ -75,7 +78,7 @@ pub struct LayerBuffers {
     pub fraction_sum: f64,
     /// What was counted on the way.
     pub tally: Tally,
-    scratch: LayerScratch,
+    pub(super) scratch: LayerScratch,
 }
 
 /// Asked between rows whether to stop.
@@ -97,7 +100,7 @@ pub struct LayerSampler<'a> {
     /// The bodies of the assembly.
     bodies: Vec<BodySampler>,
     /// The one that the assembly is, where it is one.
-    single: Option<usize>,
+    pub(super) single: Option<usize>,
 }
 
 impl std::fmt::Debug for LayerSampler<'_> {
@@ -116,6 +119,7 @@ pub(super) struct LayerScratch {
     inside: Vec<u64>,
     body: BodyScratch,
     composite: CompositeScratch,
+    pub(super) fractions: FractionScratch,
 }
 
 /// What one thread reuses that fills layers of a large buffer.
@@ -177,9 +181,13 @@ impl<'a> LayerSampler<'a> {
         selection: Selection,
         sampler: impl Fn(&Arc<Body>) -> BodySampler + Send + Sync,
     ) -> Self {
-        let fractions = selection
-            .fraction
-            .then(|| FractionSampler::new(assembly, grid.spacing()));
+        let fractions = selection.fraction.then(|| {
+            FractionSampler::new(
+                assembly,
+                grid,
+                selection.fraction_error.unwrap_or(FRACTION_ERROR),
+            )
+        });
         let mut materials = assembly.added().map(Part::material);
         let first = materials.next();
         let (surfaces, layered) = if selection.material && materials.any(|m| Some(m) != first) {
@@ -223,12 +231,13 @@ impl<'a> LayerSampler<'a> {
     pub fn bytes_per_layer(assembly: &Assembly, grid: &GridSpec, selection: &Selection) -> u64 {
         let voxels = grid.layer_len() as u64;
         let each = |on: bool, bytes: u64| if on { bytes } else { 0 };
-        // A bit of each voxel is kept beside its byte, and two for each body of a composite.
+        // A bit of each voxel is kept beside its byte, and two for each body of a composite; and its share of the voxel.
         let bodies = match assembly.single_index() {
             Some(_) => 0,
             None => assembly.bodies().len() as u64,
         };
         (voxels / 8).saturating_mul(1 + 2 * bodies)
+            + voxels.saturating_mul(each(selection.fraction, 8 * bodies))
             + voxels
                 * (1 + each(selection.fraction, 4)
                     + each(selection.sdf, 4)
@@ -284,7 +293,26 @@ impl<'a> LayerSampler<'a> {
             self.find_distances(k, scratch, &mut out.sdf, None);
             self.count_certainty(k, scratch, &out.sdf, &mut out.tally.certainty);
         }
-        self.rows(k, self.selection.sdf && !measured, out);
+        let fractions = self.find_fractions(k, out);
+        self.rows(k, [self.selection.sdf && !measured, fractions], out);
+    }
+
+    /// Finds the fractions of layer `k`, or those of each body; whether rows are still to be filled.
+    fn find_fractions(&self, k: usize, out: &mut LayerBuffers) -> bool {
+        let Some(fractions) = &self.fractions else {
+            return false;
+        };
+        let scratch = &mut out.scratch.fractions;
+        let how = (self.kernel, self.cancel);
+        if let Some(single) = self.single {
+            let (asked, values) = ((self.assembly, single), &mut out.fraction);
+            let found = fractions.layer(how, asked, k, scratch, values, &mut out.tally);
+            out.fraction_sum = found.unwrap_or(0.0);
+            return found.is_none();
+        }
+        let voxels = self.grid.layer_len();
+        fractions.shares(how, self.assembly, (k, voxels), scratch);
+        true
     }
 
     /// Finds which voxels of layer `k` are inside.
@@ -293,6 +321,7 @@ impl<'a> LayerSampler<'a> {
             inside,
             body,
             composite,
+            ..
         } = scratch;
         inside.clear();
         inside.resize(bits::words_for(self.grid.layer_len()), 0);
@@ -318,6 +347,7 @@ impl<'a> LayerSampler<'a> {
             inside,
             body,
             composite,
+            ..
         } = scratch;
         if let Some(single) = self.single {
             self.bodies[single].distances(self.grid, k, writing, body, out);

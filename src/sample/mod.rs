@@ -3,8 +3,7 @@
 //! The unit of work is a z layer. Layers do not depend on each other: any number of threads gives the same values.
 //! Each body has the quickest way that its turn and its axis allow, to the same membership and to distances within
 //! max(2 ulp, 1e-4 of the least spacing); composites combine those of their bodies. What has no such way, and
-//! fractions, materials and scalars, goes row by row, where one point test serves a whole run between the cuts of
-//! [`crate::solid`].
+//! materials and scalars, goes row by row, where one point test serves a whole run between the cuts of [`crate::solid`].
 //!
 //! ```text
 //!   upright     rings of a layer ──> ends of all rows ──> bits, 64 voxels a word ──> bytes
@@ -19,6 +18,8 @@
 //!   wedge       what less than a full turn leaves of a layer
 //!   body        the way of one body
 //!   composite   bits and distances of several
+//!   flux        fractions of one body by what flows through the sides of voxels
+//!   fraction    fractions of one body and of several
 //!   rows        the rest
 //!   row_writer  rows of a layer, to the memory one at a time
 //!   memory      stores past the caches, large pages
@@ -32,6 +33,7 @@ mod cap_rows;
 mod caps;
 mod composite;
 mod divided;
+mod flux;
 mod fraction;
 mod known;
 mod layer;
@@ -52,5 +54,5 @@ mod wedge;
 
 pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
-pub use tally::{Certainty, FRACTION_PROMISE, Loose, Tally};
+pub use tally::{Certainty, FRACTION_ERROR, FRACTION_PROMISE, Loose, Tally, Ways};
 pub use volume::{filled, fraction, material, occupancy, occupancy_bits, signed_distance};

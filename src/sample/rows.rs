@@ -1,4 +1,4 @@
-//! What is sampled row by row, each voxel by the exact path: fractions, materials, scalars of volumes, and distances
+//! What is sampled row by row, each voxel by the exact path: materials, scalars of volumes, and distances and fractions
 //! that no table holds.
 
 use super::layer::{LayerBuffers, LayerSampler, stored};
@@ -16,12 +16,15 @@ struct Scratch {
 
 impl LayerSampler<'_> {
     /// What the rows of a layer still need.
-    pub(super) fn rows(&self, k: usize, distances: bool, out: &mut LayerBuffers) {
+    pub(super) fn rows(&self, k: usize, [distances, fractions]: [bool; 2], out: &mut LayerBuffers) {
         let [nx, ny, _] = self.grid.dims();
+        let shares = &out.scratch.fractions;
+        let fractions = self.fractions.as_ref().filter(|_| fractions);
         let sides = distances
-            || self.fractions.is_some()
+            || fractions.is_some_and(|f| f.needs_sides(shares))
             || self.selection.material && !self.layered.is_empty();
-        if !(sides || self.selection.material || !self.scalars.is_empty()) {
+        let others = fractions.is_some() || self.selection.material || !self.scalars.is_empty();
+        if !(sides || others) {
             return;
         }
         let band = self.band();
@@ -54,14 +57,14 @@ impl LayerSampler<'_> {
                 let sdf = &mut out.sdf[range.clone()];
                 self.distance_row(j, k, &mut scratch, occupancy, sdf, &mut out.tally.certainty);
             }
-            if let Some(fractions) = &self.fractions {
+            if let Some(fractions) = fractions {
                 out.fraction_sum += fractions.row(
                     self.assembly,
                     self.grid,
                     [j, k],
-                    &scratch.sides,
+                    (&scratch.sides, &out.scratch.fractions),
                     &mut out.fraction[range],
-                    &mut out.tally.loose,
+                    &mut out.tally,
                 );
             }
         }

@@ -11,9 +11,26 @@ pub struct Tally {
     pub materials: BTreeMap<u32, u64>,
     /// Fractions that are not known as well as is promised.
     pub loose: Loose,
+    /// How the fractions of voxels were found that a surface may pass through.
+    pub ways: Ways,
 }
 
-/// Error of a fraction, in voxels, up to which nothing is said.
+/// How the fractions of voxels were found that a surface may pass through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ways {
+    /// By the flux through their sides.
+    pub flux: u64,
+    /// By the sections of one body in them.
+    pub sections: u64,
+    /// By division, as several bodies touch them.
+    pub divided: u64,
+}
+
+/// Error allowed to a fraction, in voxels, where no other is asked for.
+pub const FRACTION_ERROR: f64 = 1e-9;
+
+/// Error of a fraction, in voxels, up to which nothing is said: what voxels that several surfaces pass through are
+/// divided down to.
 pub const FRACTION_PROMISE: f64 = 1e-6;
 
 /// Fractions whose bound is above [`FRACTION_PROMISE`].
@@ -26,6 +43,14 @@ pub struct Loose {
 }
 
 impl Loose {
+    /// Counts fractions of one bound.
+    pub(super) fn count_all(&mut self, voxels: u64, bound: f64) {
+        if bound > FRACTION_PROMISE * (1.0 + 1e-6) && voxels > 0 {
+            self.voxels += voxels;
+            self.bound = self.bound.max(bound);
+        }
+    }
+
     pub(super) fn count(&mut self, bound: f64) {
         // A bound that just meets it is a sum of many.
         if bound > FRACTION_PROMISE * (1.0 + 1e-6) {
@@ -58,6 +83,9 @@ impl Tally {
         a.lower_bound_near += b.lower_bound_near;
         self.loose.voxels += other.loose.voxels;
         self.loose.bound = self.loose.bound.max(other.loose.bound);
+        self.ways.flux += other.ways.flux;
+        self.ways.sections += other.ways.sections;
+        self.ways.divided += other.ways.divided;
         for (&material, &voxels) in &other.materials {
             *self.materials.entry(material).or_default() += voxels;
         }

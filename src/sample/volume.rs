@@ -149,7 +149,8 @@ pub fn occupancy_bits(scene: &Scene, grid: &GridSpec) -> Result<BitVolume, crate
     Ok(BitVolume::new(*grid, words))
 }
 
-/// Share of each voxel that the solid fills, within 1e-6.
+/// Share of each voxel that the solid fills, within [`FRACTION_ERROR`](super::FRACTION_ERROR) before it is rounded, or
+/// where surfaces of several solids pass through it within [`FRACTION_PROMISE`](super::FRACTION_PROMISE).
 ///
 /// # Errors
 /// [`crate::Error`] when the volume does not fit the address space.

@@ -14,7 +14,7 @@ use super::path::{Path, Stretch};
 use super::row::{Cuts, Row};
 use super::rule::{Area, Cover, Normal, Patch, Rule};
 use crate::math::quadrature::Integral;
-use crate::math::tetrahedra::{HalfSpace, box_volume_within};
+use crate::math::tetrahedra::{HalfSpace, box_share_under, box_volume_within};
 use crate::math::{Aabb, Dd, Real, Side, Similarity};
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -136,17 +136,29 @@ impl Block {
     pub(super) fn fraction_within(&self, sides: DVec3, centre: DVec3, spaces: &[HalfSpace]) -> f64 {
         let local = self.frame.to_local(centre).point;
         let scale = self.frame.scale();
-        let mut all: SmallVec<[HalfSpace; 12]> = SmallVec::new();
-        for i in 0..3 {
-            for sign in [1.0, -1.0] {
-                all.push(HalfSpace {
-                    normal: self.frame.axis(i) * sign,
-                    offset: (self.half[i] - sign * local[i]) * scale,
-                });
+        let half = 0.5 * sides;
+        let faces = (0..3).flat_map(|i| {
+            [1.0, -1.0].map(|sign| HalfSpace {
+                normal: self.frame.axis(i) * sign,
+                offset: (self.half[i] - sign * local[i]) * scale,
+            })
+        });
+        // Those that pass through the voxel.
+        let mut cutting: SmallVec<[HalfSpace; 12]> = SmallVec::new();
+        for space in faces.chain(spaces.iter().copied()) {
+            let reach = (space.normal * half).abs().element_sum();
+            if space.offset <= -reach {
+                return 0.0;
+            }
+            if space.offset < reach {
+                cutting.push(space);
             }
         }
-        all.extend_from_slice(spaces);
-        let share = box_volume_within(0.5 * sides, &all) / sides.element_product();
+        let share = match cutting.as_slice() {
+            [] => 1.0,
+            [one] => box_share_under(half, one),
+            several => box_volume_within(half, several) / sides.element_product(),
+        };
         if share < SNAP {
             0.0
         } else if share > 1.0 - SNAP {

@@ -72,6 +72,15 @@ impl Body {
         }
     }
 
+    /// The same, or the turned region that a volume's nets are proved to be to some ulps of their size and place.
+    pub(crate) fn turned_region(&self) -> Option<&Revolved> {
+        match self {
+            Self::Revolved(one) => Some(one),
+            Self::Patches(nets) => nets.turned(),
+            _ => None,
+        }
+    }
+
     /// The smallest box around the solid, in scene units.
     #[must_use]
     pub fn bounds(&self) -> Aabb {

@@ -18,7 +18,12 @@
 //! move evenly with z. So where two of them meet runs along a straight line, and that it passes a third one, or that the
 //! circle passes it or touches a line, are zeros of polynomials in z or in the piece's parameter: all are cuts. Without
 //! them the two rules of a panel may agree on a wrong number, as a kink need not lie where their points see it.
+//!
+//! A voxel that nothing but its own sides bounds has its areas from [`super::cross_section`]; its cuts are looked for where
+//! the radii of the piece and of a corner or a side overlap, and between cuts where nothing is touched, seven points are
+//! tried first.
 
+use super::cross_section::{Corner, CrossSections};
 use super::revolved::Revolved;
 use super::turn::Turn;
 use crate::math::bernstein::{self, Coefficients};
@@ -119,6 +124,21 @@ impl CellShape {
     /// Half the diagonal, in local lengths.
     pub(crate) fn half_diagonal(&self) -> f64 {
         self.corners.iter().fold(0.0, |m, c| m.max(c.length()))
+    }
+
+    /// The cross-sections of a slab, at a voxel centred on `centre`.
+    fn cross_sections(&self, slab: usize, centre: DVec2) -> CrossSections {
+        let corner = |&[i, j]: &[usize; 2]| {
+            let (a, b) = (self.corners[i], self.corners[j]);
+            let slope = DVec2::new(b.x - a.x, b.y - a.y) / (b.z - a.z);
+            Corner {
+                at: centre + DVec2::new(a.x, a.y) - slope * a.z,
+                slope,
+            }
+        };
+        let corners = self.slabs[slab].iter().map(corner).collect();
+        let middle = 0.5 * (self.heights[slab] + self.heights[slab + 1]);
+        CrossSections::new(corners, middle)
     }
 
     /// The cross-section at height `z` within a slab, at a voxel centred on `centre`.
@@ -360,11 +380,60 @@ impl Revolved {
     /// The volume between two heights of corners, in parts within which the half-spaces meet the
     /// same edges.
     fn slab_volume(&self, cell: &Cell, slab: usize) -> f64 {
+        if !cell.shape.upright && cell.reach == Reach::Whole && cell.clips.is_empty() {
+            return self.whole_slab_volume(cell, slab);
+        }
         let mut heights = cell.meetings(slab);
         heights.extend([cell.shape.heights[slab], cell.shape.heights[slab + 1]]);
         heights.sort_by(f64::total_cmp);
         let parts = heights.windows(2).filter(|h| h[0] < h[1]);
         parts.map(|h| self.part_volume(cell, slab, h)).sum()
+    }
+
+    /// The same of a slab that nothing is cut off.
+    fn whole_slab_volume(&self, cell: &Cell, slab: usize) -> f64 {
+        let (shape, z) = (cell.shape, cell.z);
+        let (bottom, top) = (shape.heights[slab], shape.heights[slab + 1]);
+        let sections = shape.cross_sections(slab, cell.flat);
+        let reach = sections.corners.iter().map(|c| c.radii([bottom, top])[1]);
+        // A hair more, for the rounding.
+        let far = reach.fold(0.0, f64::max) * (1.0 + 1e-12);
+        let near = (cell.flat.length() - shape.half_diagonal()).max(0.0) * (1.0 - 1e-12);
+        let mut volume = 0.0;
+        self.boundary_near(z + bottom, z + top, near, |part| {
+            let piece = &part.piece;
+            let sign = f64::from(part.disc_sign());
+            if sign == 0.0 || piece.on_axis {
+                return;
+            }
+            let low = piece.bounds().min[1].max(z + bottom);
+            let high = piece.bounds().max[1].min(z + top);
+            if low >= high {
+                return;
+            }
+            let between = [low - z, high - z];
+            let mut stretch = None;
+            let mut radii = [piece.bounds().min[0], piece.bounds().max[0]];
+            if radii[0] < far {
+                let found = Stretch::new(part, low, high);
+                let ends = [found.from, found.to].map(|t| found.point(t)[0]);
+                radii = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+                stretch = Some(found);
+            }
+            volume += sign
+                * match stretch {
+                    _ if radii[1] <= near => 0.0,
+                    Some(stretch) if radii[0] < far => {
+                        let cuts = stretch.at_sections(&sections, between, radii, z);
+                        stretch.sections_volume(&cuts, cell.tolerance, |r, height| {
+                            sections.within_disc(height - z, r)
+                        })
+                    }
+                    // Beyond the slab the disc takes the whole of it.
+                    _ => sections.volume(between),
+                };
+        });
+        volume
     }
 
     fn part_volume(&self, cell: &Cell, slab: usize, heights: &[f64]) -> f64 {
@@ -521,6 +590,8 @@ struct Stretch<'a> {
 }
 
 type Cuts = SmallVec<[f64; 16]>;
+/// Parameters with whether the circle touches a side there.
+type KindCuts = SmallVec<[(f64, bool); 16]>;
 
 impl<'a> Stretch<'a> {
     fn new(part: &'a BoundaryPiece, low: f64, high: f64) -> Self {
@@ -536,8 +607,9 @@ impl<'a> Stretch<'a> {
     /// The radius and height at a parameter.
     fn point(&self, t: f64) -> [f64; 2] {
         let piece = &self.part.piece;
-        let p = piece.twin().at(t);
-        [p[0] + piece.twin().origin[0], p[1] + piece.twin().origin[1]]
+        let twin = piece.twin();
+        let p = twin.at(t);
+        [p[0] + twin.origin[0], p[1] + twin.origin[1]]
     }
 
     /// Parameters at which the radius takes one of the values.
@@ -591,9 +663,112 @@ impl<'a> Stretch<'a> {
         cuts
     }
 
+    /// Parameters at which the circle touches a side of the sections (true) or passes a corner (false), between two
+    /// heights from the voxel's centre, which is at `z`; the stretch's radii bound where that may be.
+    fn at_sections(
+        &self,
+        sections: &CrossSections,
+        heights: [f64; 2],
+        radii: [f64; 2],
+        z: f64,
+    ) -> KindCuts {
+        let room = 1e-12 * (radii[1] + 1.0);
+        let meets = |[least, most]: [f64; 2]| most >= radii[0] - room && least <= radii[1] + room;
+        let twin = self.part.piece.twin();
+        let ([r, h, w], origin) = (twin.rows(), twin.origin);
+        let plus = |a: &[f64], b: &[f64], times: f64| -> Coefficients<f64> {
+            a.iter().zip(b).map(|(a, b)| a + times * b).collect()
+        };
+        let (r, h) = (plus(&r, &w, origin[0]), plus(&h, &w, origin[1] - z));
+        let [r, h, w] = [&*r, &*h, &*w].map(|c| bernstein::restrict(c, self.from, self.to));
+        let even = |constant: f64, slope: f64| -> Coefficients<f64> {
+            (w.iter().zip(&h))
+                .map(|(w, h)| constant * w + slope * h)
+                .collect()
+        };
+        let mut cuts = KindCuts::new();
+        let mut zeros = |part: &[f64], touches: bool| {
+            let mut found = Cuts::new();
+            sign_changes(part, self.from, self.to, 0, &mut found);
+            cuts.extend(found.into_iter().map(|t| (t, touches)));
+        };
+        for (line, distances) in sections.lines().zip(sections.distances(heights)) {
+            if meets(distances) {
+                let off = even(line[0], line[1]);
+                zeros(&plus(&off, &r, 1.0), true);
+                zeros(&plus(&off, &r, -1.0), true);
+            }
+        }
+        let mut square = None;
+        for corner in &sections.corners {
+            if meets(corner.radii(heights)) {
+                let square = square.get_or_insert_with(|| bernstein::product(&r, &r));
+                let [x, y] = [0, 1].map(|c| even(corner.at[c], corner.slope[c]));
+                let [x, y] = [&x, &y].map(|c| bernstein::product(c, c));
+                let sum = bernstein::sum(&x, &y);
+                zeros(&bernstein::difference(&sum, square), false);
+            }
+        }
+        cuts
+    }
+
+    /// ∫ area(r(z), z) |dz|, cut at the given parameters. Where the circle touches a side the area goes as the power
+    /// 3/2 of the parameter, which a substitution makes smooth; elsewhere few points will do.
+    fn sections_volume(
+        &self,
+        cuts: &KindCuts,
+        tolerance: f64,
+        area: impl Fn(f64, f64) -> f64,
+    ) -> f64 {
+        let mut ends: KindCuts = cuts
+            .iter()
+            .copied()
+            .filter(|&(t, _)| t > self.from && t < self.to)
+            .collect();
+        ends.push((self.from, false));
+        ends.push((self.to, false));
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let integrand = self.integrand(area);
+        let panels = ends.windows(2).filter(|c| c[1].0 > c[0].0);
+        let volumes = panels.map(|c| {
+            let (from, width) = (c[0].0, c[1].0 - c[0].0);
+            if c[0].1 || c[1].1 {
+                let smooth = |u: f64| {
+                    let at = from + width * u * u * (3.0 - 2.0 * u);
+                    integrand(at) * width * 6.0 * u * (1.0 - u)
+                };
+                return quadrature::integrate(smooth, 0.0, 1.0, tolerance, 256).value;
+            }
+            let quick = quadrature::short_panel(&mut |t| integrand(t), from, c[1].0);
+            if quick.error <= tolerance {
+                return quick.value;
+            }
+            quadrature::integrate(&integrand, from, c[1].0, tolerance, 256).value
+        });
+        volumes.sum()
+    }
+
+    /// area(r(t), z(t)) |z'(t)|.
+    fn integrand<'s>(&'s self, area: impl Fn(f64, f64) -> f64 + 's) -> impl Fn(f64) -> f64 + 's {
+        let piece = &self.part.piece;
+        let twin = piece.twin();
+        let ([r, z, w], origin) = (twin.rows(), twin.origin);
+        let linear = piece.degree() == 1;
+        let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
+        move |t: f64| {
+            if linear {
+                let dz = end[1] - start[1];
+                return area(start[0] + (end[0] - start[0]) * t, start[1] + dz * t) * dz.abs();
+            }
+            let r = bernstein::evaluate(&r, t);
+            let (z, dz) = bernstein::evaluate_with_derivative(&z, t);
+            let (w, dw) = bernstein::evaluate_with_derivative(&w, t);
+            area(r / w + origin[0], z / w + origin[1]) * ((dz * w - z * dw) / (w * w)).abs()
+        }
+    }
+
     /// ∫ area(r(z), z) |dz|, cut at the given parameters.
     fn volume(&self, cuts: &[f64], tolerance: f64, area: &impl Fn(f64, f64) -> f64) -> f64 {
-        let piece = &self.part.piece;
         let mut ends: Cuts = cuts
             .iter()
             .copied()
@@ -602,20 +777,7 @@ impl<'a> Stretch<'a> {
         ends.push(self.from);
         ends.push(self.to);
         ends.sort_by(f64::total_cmp);
-        let twin = piece.twin();
-        let ([r, z, w], origin) = (twin.rows(), twin.origin);
-        let linear = piece.degree() == 1;
-        let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
-        let integrand = |t: f64| {
-            if linear {
-                let dz = end[1] - start[1];
-                return area(start[0] + (end[0] - start[0]) * t, start[1] + dz * t) * dz.abs();
-            }
-            let (r, _) = bernstein::evaluate_with_derivative(&r, t);
-            let (z, dz) = bernstein::evaluate_with_derivative(&z, t);
-            let (w, dw) = bernstein::evaluate_with_derivative(&w, t);
-            area(r / w + origin[0], z / w + origin[1]) * ((dz * w - z * dw) / (w * w)).abs()
-        };
+        let integrand = self.integrand(area);
         ends.windows(2)
             .filter(|c| c[1] > c[0])
             .map(|c| {

@@ -12,6 +12,7 @@ mod body;
 mod bounds;
 mod coaxial;
 mod composite;
+mod cross_section;
 mod ellipsoid;
 mod faces;
 mod flux;

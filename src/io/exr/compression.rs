@@ -173,7 +173,7 @@ mod tests {
             fraction: true,
             sdf: true,
             material: true,
-            band: None,
+            ..Selection::default()
         };
         let sampler = LayerSampler::new(scene.assembly(), &grid, selection);
         let layers: Vec<LayerBuffers> = (1..6)

@@ -115,6 +115,8 @@ pub struct StackSummary {
     pub bounds: Option<[[f64; 3]; 2]>,
     /// Voxels whose centre is inside; counted from `occupancy` where that is a channel.
     pub voxels_inside: Option<u64>,
+    /// Sum of the fractions before they were rounded to be stored; without it that of the stored ones.
+    pub fraction_sum: Option<f64>,
     /// Volume of the solid itself, in cubed scene units.
     pub volume_exact: Option<f64>,
     /// How wrong that may be, in cubed scene units.
@@ -342,7 +344,10 @@ impl StackWriter {
             reason = "a count of 2^53 voxels is out of reach"
         )]
         let volume_occupancy = voxels_inside.map(|n| n as f64 * voxel).filter(finite);
-        let volume_fraction = total("fraction").map(|t| t.sum * voxel).filter(finite);
+        let stored = total("fraction").map(|t| t.sum);
+        let fractions = stored.map(|sum| summary.fraction_sum.unwrap_or(sum));
+        let volume_fraction = fractions.map(|sum| sum * voxel).filter(finite);
+        let volume_fraction_stored = stored.map(|sum| sum * voxel).filter(finite);
         let mut files: Vec<FileRecord> = written.layers.into_values().map(|l| l.0).collect();
         let mut others = written.others;
         others.sort_by(|a, b| a.name.cmp(&b.name));
@@ -378,6 +383,7 @@ impl StackWriter {
             voxels_inside,
             volume_occupancy,
             volume_fraction,
+            volume_fraction_stored,
             volume_exact: summary.volume_exact,
             volume_exact_error: summary.volume_exact_error,
             solids: summary.solids,

@@ -225,6 +225,9 @@ pub(super) fn of_manifest(manifest: &Manifest) -> Vec<String> {
     wrong
 }
 
+/// What storing fractions as f32 may change their sum by, as a share of it; and, the last bit, the sum itself.
+const STORED: f64 = 1.0 / (1_u64 << 24) as f64 + 1e-12;
+
 /// What the totals of all slices contradict.
 pub(super) fn of_totals(manifest: &Manifest, slices: &[Slice]) -> Vec<String> {
     let rounding = if manifest.compression == Compression::Pxr24.name() {
@@ -284,7 +287,9 @@ pub(super) fn of_totals(manifest: &Manifest, slices: &[Slice]) -> Vec<String> {
     let volume = inside.map(|n| number(n) * voxel);
     hold("volume_occupancy", manifest.volume_occupancy, volume);
     let volume = total("fraction").map(|t| t.sum * voxel);
-    hold("volume_fraction", manifest.volume_fraction, volume);
+    // What older programs wrote as the one is the other.
+    let stored = (manifest.volume_fraction_stored).or(manifest.volume_fraction);
+    hold("volume_fraction_stored", stored, volume);
     let has_material = total("material").is_some();
     for one in manifest.material_volumes.iter().filter(|_| has_material) {
         let counts = slices
@@ -295,6 +300,13 @@ pub(super) fn of_totals(manifest: &Manifest, slices: &[Slice]) -> Vec<String> {
         hold(&what, one.voxels.map(number), Some(number(voxels)));
         let what = format!("the volume by occupancy of material {}", one.id);
         hold(&what, one.volume_occupancy, Some(number(voxels) * voxel));
+    }
+    if let (Some(before), Some(stored)) = (manifest.volume_fraction, stored)
+        && !((before - stored).abs() <= (STORED + rounding) * stored.abs())
+    {
+        wrong.push(format!(
+            "volume_fraction is listed as {before}, and of the stored values it is {stored}"
+        ));
     }
     wrong
 }

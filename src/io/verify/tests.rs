@@ -62,7 +62,7 @@ fn what_is_no_stack_is_an_error() {
 #[test]
 fn what_the_slices_contradict_is_found() {
     type Edit = fn(&mut crate::io::Manifest);
-    let edits: [(&str, Edit); 26] = [
+    let edits: [(&str, Edit); 27] = [
         ("origin", |m| m.grid.origin[1] += 1e-15),
         ("spacing", |m| m.grid.spacing[2] = 0.25),
         ("dims swapped", |m| m.grid.dims.swap(0, 1)),
@@ -83,8 +83,11 @@ fn what_the_slices_contradict_is_found() {
         ("inside", |m| m.voxels_inside = Some(7)),
         ("not inside", |m| m.voxels_inside = None),
         ("occupancy", |m| m.volume_occupancy = Some(1.0)),
+        ("fraction as stored", |m| {
+            m.volume_fraction_stored = m.volume_fraction_stored.map(f64::next_up)
+        }),
         ("fraction", |m| {
-            m.volume_fraction = m.volume_fraction.map(f64::next_up)
+            m.volume_fraction = m.volume_fraction.map(|v| v * (1.0 + 1e-7))
         }),
         ("scene", |m| {
             m.scene = serde_json::json!({ "schema": 1, "x": 2 })
