@@ -37,6 +37,13 @@ fn prepared(composite: Composite) -> Option<Case> {
     Some(case)
 }
 
+/// Where the nearest point of the boundary is by the distances about a point.
+fn said(case: &Case, p: DVec3, sdf: f64) -> DVec3 {
+    let step = 1e-5 * case.size;
+    let slope = DVec3::AXES.map(|e| case.distance(p + e * step).0 - case.distance(p - e * step).0);
+    p - DVec3::from_array(slope).normalize_or_zero() * sdf
+}
+
 /// One point against the truth.
 fn examine(case: &Case, p: DVec3, all_exact: bool, random: &mut Random) -> Report {
     let model = case.model.as_ref().expect("faces");
@@ -82,9 +89,16 @@ fn examine(case: &Case, p: DVec3, all_exact: bool, random: &mut Random) -> Repor
     let moved = case.composite.moved.1.length();
     let bound = 1e-10 * case.size + 8.0 * f64::EPSILON * (p.length() + moved);
     if exact && sdf.abs() < least - bound {
-        // The samples may have missed a short curve.
-        if let Some(better) = model.search(q, sdf.abs() / scale, random) {
-            least = least.min(better.distance(q) * scale);
+        // The samples may have missed a short curve: what is said is looked at where it is said to be.
+        let place = case.unplaced(said(case, p, sdf));
+        for better in [
+            model.witness(place, q),
+            model.search(q, sdf.abs() / scale, random),
+        ] {
+            least = least.min(far(better));
+            if sdf.abs() >= least - bound {
+                break;
+            }
         }
     }
     if sdf.abs() > most + bound {

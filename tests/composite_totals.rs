@@ -652,6 +652,22 @@ fn a_profile_of_extreme_aspect() {
     assert!((found.volume - volume).abs() <= found.error_estimate.volume + 1e-13 * volume);
 }
 
+/// Of a solid that is far longer than the others are thick no total is told; before it is so long, the right one.
+#[test]
+fn a_rod_as_long_as_a_country() {
+    for (length, told) in [(1e3, true), (1e5, true), (1.5e9, false)] {
+        let half = 0.5 * length;
+        let rod = cylinder(1.0, [-half, 0.0, 0.0], [1.0, 0.0, 0.0], length, "add");
+        let other = cylinder(1.0, [0.0, 0.0, -2.0], [0.0, 0.0, 1.0], 4.0, "intersect");
+        let found = scene(&format!("[[solid]]\n{rod}\n[[solid]]\n{other}\n")).measures();
+        assert_eq!(found.is_some(), told, "{length}: {found:?}");
+        if let Some(found) = found {
+            let off = (found.volume - 16.0 / 3.0).abs();
+            assert!(off <= found.error_estimate.volume, "{length}: {found:?}");
+        }
+    }
+}
+
 /// One of each kind.
 #[test]
 fn totals_of_composites() {

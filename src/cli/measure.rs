@@ -14,7 +14,7 @@ use std::fmt::Write;
 use std::process::ExitCode;
 
 /// What is said where the total would take minutes.
-const NOT_MEASURED: &str = "total: not measured, as so many solids meet that it would take minutes; measure fewer at a time";
+const NOT_MEASURED: &str = "total: not measured, as so many solids meet that it would take minutes, or one is some 10^7 times as long as another is thick; measure fewer at a time";
 
 pub(super) fn run(
     arguments: &Measure,

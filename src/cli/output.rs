@@ -16,7 +16,7 @@ pub(super) const NOTHING_LEFT: &str =
 static ANSWERED: AtomicBool = AtomicBool::new(false);
 
 /// What is said where the total is more work than a run that samples waits for.
-pub(super) const VOLUME_NOT_MEASURED: &str = "volume_exact: not measured, as the solids meet so often, or so nearly, that it would take longer than the sampling should wait; `voxlathe measure` takes the time";
+pub(super) const VOLUME_NOT_MEASURED: &str = "volume_exact: not measured, as the solids meet so often, or so nearly, that it would take longer than the sampling should wait, or one is some 10^7 times as long as another is thick";
 
 /// The error of a measured volume, relative to it, up to which it is called exact.
 const EXACT: f64 = 1e-9;

@@ -27,13 +27,16 @@ use std::sync::Arc;
 const STAND_IN: f64 = 64.0;
 /// Questions to solids, after which estimates are taken as they are, or the composite is not measured: some
 /// seconds' work.
-const MOST_WORK: u64 = 12_000_000;
+const MOST_WORK: u64 = 16_000_000;
+/// Shortest side of a body, as a share of the furthest coordinate: what is thinner is lost beside the places that are
+/// asked about a surface.
+const SLENDER: f64 = 1e-7;
 /// Panels whose extremes are refined for each direction.
 const CANDIDATES: usize = 3;
 
 impl Assembly {
     /// Volume, area and moments of the whole solid; `None` where its surfaces meet so often, or so nearly, that
-    /// their faces would take minutes.
+    /// their faces would take minutes, and where a solid is 10⁷ times as long as another is thick.
     #[must_use]
     pub fn moments(&self) -> Option<Moments> {
         self.moments_within(MOST_WORK)
@@ -129,10 +132,18 @@ fn over_faces(
         let b = b.bounds();
         m.max(b.min.abs().max(b.max.abs()).max_element())
     });
+    let slender = |b: &Aabb| b.sides().min_element() < SLENDER * reach;
+    if slender(&around) || bodies.iter().any(|b| slender(&b.bounds())) {
+        return None;
+    }
+    let most = most_volume(&bodies, &terms);
     let faces = Faces::new(bodies, terms, reach);
     let panels = integrated(&faces, size, *work)?;
     *work = work.saturating_sub(faces.work());
     let mut moments = moments(&totals(&panels, &faces), centre);
+    if !is_possible(&moments, 0.5 * around.sides(), most) {
+        return None;
+    }
     if stand_ins {
         moments.widen(STAND_IN * f64::EPSILON, reach + centre.length());
     }
@@ -142,6 +153,35 @@ fn over_faces(
         None
     };
     Some((moments, bounds))
+}
+
+/// No less than the volume of the terms together.
+fn most_volume(bodies: &[Arc<Body>], terms: &[Term]) -> f64 {
+    let of_term = |t: &Term| {
+        let kept = t.factors.iter().filter(|f| !f.complement);
+        let volumes = kept.map(|f| bodies[f.body].volume());
+        volumes
+            .map(|v| v.value + v.error)
+            .fold(f64::INFINITY, f64::min)
+    };
+    terms.iter().map(of_term).sum()
+}
+
+/// Whether there may be a solid with such moments about the middle of a box that it is in, given half the box's sides,
+/// and with that volume at most. What is not is no answer, whatever its error is estimated to be.
+fn is_possible(moments: &Moments, half: DVec3, most: f64) -> bool {
+    let volume = moments.volume;
+    let largest = volume.value + volume.error;
+    let exceeds = |part: Integral, bound: f64| {
+        part.value.abs() - part.error > bound * largest * (1.0 + 1e-9) + f64::MIN_POSITIVE
+    };
+    volume.value - volume.error <= most.min(8.0 * half.element_product()) * (1.0 + 1e-9)
+        && (0..3).all(|i| {
+            let square = moments.second[i][i];
+            square.value + square.error >= 0.0
+                && !exceeds(square, half[i] * half[i])
+                && !exceeds(moments.first[i], half[i])
+        })
 }
 
 /// The bodies of the terms, moved so that `centre` is the origin.

@@ -262,6 +262,8 @@ impl Faces {
         let sheet = &self.sheets[sheet];
         let [a, b] = rule.range;
         let cuts = self.cuts(sheet, t, rule);
+        let own = LINE + STRETCH * (cuts.len() as u64 + 1);
+        self.work.fetch_add(own, Ordering::Relaxed);
         let mut signature = Signature::new(NARROW * (b - a));
         let mut from = a;
         let mut stretch: Option<([f64; 2], f64)> = None;
@@ -330,6 +332,10 @@ impl Faces {
         })
     }
 }
+
+/// What a line takes that asks no body anything, and each of its stretches, in questions.
+const LINE: u64 = 8;
+const STRETCH: u64 = 2;
 
 /// The direction number `k` of +x, +y, +z, -x, -y, -z.
 pub(super) fn direction(k: usize) -> DVec3 {

@@ -427,6 +427,13 @@ impl Model {
             }
             all.extend(d.try_normalize());
         }
+        // Between two that are nearly parallel that does not come into the narrow sector.
+        for (i, a) in normals.iter().enumerate() {
+            for b in &normals[i + 1..] {
+                all.extend((*a - *b).try_normalize());
+                all.extend((*a + *b).try_normalize());
+            }
+        }
         all
     }
 
@@ -692,6 +699,31 @@ impl Model {
             }
         }
         at((low + high) / 2.0)
+    }
+
+    /// The nearest to `q` of the points of the boundary beside a place: that of faces that pass there, of pairs and
+    /// triples of them.
+    pub(crate) fn witness(&self, place: DVec3, q: DVec3) -> Option<DVec3> {
+        let near = self.through(place, 1e-6 * self.size);
+        let mut best: Option<DVec3> = None;
+        let mut take = |faces: &[usize]| {
+            let Some(p) = self.onto(faces, place) else {
+                return;
+            };
+            if best.is_none_or(|b| p.distance(q) < b.distance(q)) && self.active(p) {
+                best = Some(p);
+            }
+        };
+        for (i, &a) in near.iter().enumerate() {
+            take(&[a]);
+            for (j, &b) in near.iter().enumerate().skip(i + 1) {
+                take(&[a, b]);
+                for &c in &near[j + 1..] {
+                    take(&[a, b, c]);
+                }
+            }
+        }
+        best
     }
 
     /// A longer search for a point of the boundary within `reach` of `q`: random points brought onto
