@@ -607,6 +607,11 @@ impl<'a> Stretch<'a> {
     /// The radius and height at a parameter.
     fn point(&self, t: f64) -> [f64; 2] {
         let piece = &self.part.piece;
+        if piece.degree() == 1 {
+            // As its rows would, which are not made for this.
+            let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
+            return [0, 1].map(|c| start[c] + (end[c] - start[c]) * t);
+        }
         let twin = piece.twin();
         let p = twin.at(t);
         [p[0] + twin.origin[0], p[1] + twin.origin[1]]

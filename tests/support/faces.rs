@@ -701,6 +701,16 @@ impl Model {
         at((low + high) / 2.0)
     }
 
+    /// Whether the composite and what is not of it are both met closely about a point: slivers take many looks.
+    fn is_mixed(&self, p: DVec3) -> bool {
+        let mut random = Random::new(5);
+        let first = self.inside(p);
+        (0..20_000).any(|_| {
+            let far = 2e-11 * self.size * random.between(0.0, 1.0);
+            self.inside(p + super::composite::sphere(&mut random) * far) != first
+        })
+    }
+
     /// The nearest to `q` of the points of the boundary beside a place: that of faces that pass there, of pairs and
     /// triples of them.
     pub(crate) fn witness(&self, place: DVec3, q: DVec3) -> Option<DVec3> {
@@ -710,7 +720,8 @@ impl Model {
             let Some(p) = self.onto(faces, place) else {
                 return;
             };
-            if best.is_none_or(|b| p.distance(q) < b.distance(q)) && self.active(p) {
+            let better = best.is_none_or(|b| p.distance(q) < b.distance(q));
+            if better && (self.active(p) || self.is_mixed(p)) {
                 best = Some(p);
             }
         };
