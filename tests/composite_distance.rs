@@ -385,6 +385,37 @@ fn no_sheet_where_faces_join() {
 }
 
 /// A ring less the half of it that is told by the same profile is the other half.
+/// About a point where solids of one axis touch, both surfaces are boundary up to the point: what is between them is
+/// thinner than a rounding as far off as the root of one.
+#[test]
+fn surfaces_that_touch_on_the_axis() {
+    let ball = |radius: f64, z: f64, operation: &str| {
+        format!(
+            "[[solid]]\nkind = 'sphere'\nradius = {radius:?}\naxis = {{ origin = [0, 0, {z:?}] }}\n\
+             operation = '{operation}'\n"
+        )
+    };
+    let two = |first: String, second: String| {
+        Scene::parse(&format!("schema = 1\n{first}{second}")).expect("a scene")
+    };
+    let on_another = two(ball(1.0, 0.0, "add"), ball(0.5, 1.5, "add"));
+    let within_another = two(ball(1.0, 0.0, "add"), ball(0.5, 0.5, "subtract"));
+    for far in [0.0, 1e-10, 1e-9, 1e-8, 3e-8, 1e-7, 1e-6] {
+        for aside in [0.0, 1e-9, 1e-8, 4e-8, 1e-7] {
+            let above = signed(&on_another, [aside, 0.0, 1.0 + far]);
+            assert!(
+                (above.abs() - far).abs() < 1e-13,
+                "{far:e} {aside:e}: {above:e}"
+            );
+            let below = signed(&within_another, [0.0, aside, 1.0 - far]);
+            assert!(
+                (below.abs() - far).abs() < 1e-13,
+                "{far:e} {aside:e}: {below:e}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_ring_less_its_half() {
     let text = "schema = 1\n[profiles.tube]\n\

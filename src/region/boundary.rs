@@ -9,6 +9,7 @@ use super::crossings::{CrossingSet, Winding};
 use super::piece::Piece;
 use super::tree::{Box2, BoxTree};
 use crate::math::{Dd, Real};
+use smallvec::SmallVec;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -325,10 +326,14 @@ fn meet(
     // Ends of one that lie on the other: these alone cut coincident stretches.
     let mut contacts = 0;
     let mut inner = false;
+    let mut tangencies: SmallVec<[[f64; 2]; 4]> = SmallVec::new();
     for (x, y, k) in [(a, b, j), (b, a, i)] {
-        for end in [x.start, x.end] {
+        for (s, end) in [(0.0, x.start), (1.0, x.end)] {
             if let Some(t) = parameter_on(y, end, coincident) {
                 contacts += 1;
+                if are_along(x.twin().slope(s), y.twin().slope(t.f64())) {
+                    tangencies.push(end.map(Real::f64));
+                }
                 if t > Dd::ZERO && t < Dd::ONE {
                     found.cut(k, t);
                     inner = true;
@@ -350,7 +355,7 @@ fn meet(
         found.crossing.get_or_insert(p);
         return true;
     }
-    curves_cross(a, b, i, j, found) || touching
+    curves_cross([a, b], [i, j], &tangencies, found) || touching
 }
 
 /// The parameter of `p` on `piece`, where it lies on it: 0 or 1 at its ends.
@@ -415,8 +420,19 @@ fn segments_cross(a: &Piece, b: &Piece) -> Option<(Dd, Dd)> {
 
 /// Crossings of two pieces of which one is curved, by halving both; whether there are any away
 /// from common ends.
-fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) -> bool {
+///
+/// About a point where an end of one touches the other they are as near as a rounding over the root of it: that they meet
+/// there is known already, and where they seem to, nothing is cut.
+fn curves_cross(
+    [a, b]: [&Piece; 2],
+    [i, j]: [usize; 2],
+    tangencies: &[[f64; 2]],
+    found: &mut Meetings,
+) -> bool {
     const STEPS: usize = 20_000;
+    /// Further from a tangency only curves meet that nearly coincide.
+    const ABOUT: f64 = 1e-5;
+    let far = |p: [f64; 2], q: &[f64; 2]| (p[0] - q[0]).abs().max((p[1] - q[1]).abs());
     let mut work = vec![(Part::whole(a), Part::whole(b))];
     let mut seen: Vec<[f64; 2]> = Vec::new();
     let mut met = false;
@@ -426,14 +442,14 @@ fn curves_cross(a: &Piece, b: &Piece, i: usize, j: usize, found: &mut Meetings) 
             continue;
         }
         let p = x.p[0];
-        if seen
-            .iter()
-            .any(|q| (p[0] - q[0]).abs().max((p[1] - q[1]).abs()) <= 1e-10)
-        {
+        if seen.iter().any(|q| far(p, q) <= 1e-10) {
             continue;
         }
         if x.extent().max(y.extent()) <= 1e-14 {
             seen.push(p);
+            if tangencies.iter().any(|q| far(p, q) <= ABOUT) && !transversal(a, x.t[0], b, y.t[0]) {
+                continue;
+            }
             let inner = |t: &[f64; 2]| t[0] > 1e-9 && t[1] < 1.0 - 1e-9;
             met |= inner(&x.t) || inner(&y.t);
             let (mut s, mut t) = (Dd::of(x.t[0]), Dd::of(y.t[0]));
@@ -485,6 +501,9 @@ fn transversal(a: &Piece, s: f64, b: &Piece, t: f64) -> bool {
         let (p, q) = (piece.twin().at(t - h), piece.twin().at(t + h));
         [q[0] - p[0], q[1] - p[1]]
     };
-    let (u, v) = (around(a, s), around(b, t));
-    (u[0] * v[1] - u[1] * v[0]).abs() > 1e-6 * u[0].hypot(u[1]) * v[0].hypot(v[1])
+    !are_along(around(a, s), around(b, t))
+}
+
+fn are_along(u: [f64; 2], v: [f64; 2]) -> bool {
+    (u[0] * v[1] - u[1] * v[0]).abs() <= 1e-6 * u[0].hypot(u[1]) * v[0].hypot(v[1])
 }
