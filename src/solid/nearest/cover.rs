@@ -3,12 +3,14 @@
 //! Each sheet is divided into tiles until a tile is all visible or all hidden: no other surface comes as near to its
 //! middle as the tile reaches, or only such as are the same surface all over the tile. Tiles along edges are divided to a
 //! share of the composite's size and count as both.
+//!
+//! All of this is asked for by threads that sample, and made by the first of them, in turn: one that made it in parallel
+//! would take up another's layer while it waits for the rest, and wait there for itself.
 
 use super::boxes::{Boxes, away};
 use super::sheet::{Sheet, Tile};
 use super::visible::{Scene, Spot};
 use crate::math::Aabb;
-use rayon::prelude::*;
 
 /// Reach of the tiles along edges, as a share of the composite's size.
 const FINE: f64 = 1.0 / 256.0;
@@ -38,7 +40,7 @@ enum Sort {
 /// The covers of all bodies.
 pub(super) fn covers(scene: &Scene) -> Vec<Cover> {
     let sheets = 0..scene.sheets.len();
-    let parts: Vec<[Vec<Aabb>; 2]> = sheets.into_par_iter().map(|i| divide(scene, i)).collect();
+    let parts: Vec<[Vec<Aabb>; 2]> = sheets.map(|i| divide(scene, i)).collect();
     let of_body = |b: usize| {
         let mut all = [Vec::new(), Vec::new()];
         for (sheet, part) in scene.sheets.iter().zip(&parts) {
@@ -73,7 +75,7 @@ pub(super) fn are_hidden(scene: &Scene) -> bool {
         });
         hidden
     };
-    (0..scene.sheets.len()).into_par_iter().all(is_hidden)
+    (0..scene.sheets.len()).all(is_hidden)
 }
 
 /// The boxes of the tiles of a sheet that may be hidden, and of those that may be visible.

@@ -33,7 +33,6 @@ use arc::ArcTree;
 use cover::Cover;
 use feet::View;
 use glam::DVec3;
-use rayon::prelude::*;
 use sheet::Sheet;
 use smallvec::SmallVec;
 use std::sync::atomic::AtomicU64;
@@ -240,7 +239,8 @@ fn edges(scene: &Scene, pairs: &[[usize; 2]]) -> Option<Vec<arc::Arc>> {
         clip::edges(scene, &crossing, &crossing.curves()?, &mut edges)?;
         Some(edges)
     };
-    let found: Option<Vec<Vec<arc::Arc>>> = pairs.par_iter().map(of_pair).collect();
+    // In turn, as covers are, and for the same reason.
+    let found: Option<Vec<Vec<arc::Arc>>> = pairs.iter().map(of_pair).collect();
     let arcs: Vec<arc::Arc> = found?.into_iter().flatten().collect();
     (arcs.len() <= MOST_ARCS).then_some(arcs)
 }
