@@ -270,3 +270,19 @@ fn coaxial_parts_that_touch_leave_no_gap() {
         assert!((x - y).abs() <= 2.0 * f32::EPSILON * x.abs(), "{x} and {y}");
     }
 }
+
+/// Where weights draw all of a curve but its end to another point, shares stay shares.
+#[test]
+fn weights_of_a_billionth() {
+    let head = include_str!("../scenes/vessel_head.toml");
+    let drawn = head.replacen(
+        "weights = [1, 0.8498365855987975, 1]",
+        "weights = [1, 0.8498365855987975, 1e-9]",
+        1,
+    );
+    assert_ne!(head, drawn);
+    let scene = Scene::parse(&format!("{drawn}\n[grid]\nresolution = 7\n")).expect("a scene");
+    let grid = scene.grid().expect("a grid");
+    let shares = sample::fraction(&scene, &grid).expect("memory");
+    assert!(shares.data().iter().all(|f| (0.0..=1.0).contains(f)));
+}

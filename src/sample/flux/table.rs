@@ -99,7 +99,12 @@ impl Table {
         wanted: Wanted,
     ) -> Option<Self> {
         let [low, high] = wanted.heights;
-        let parts: Vec<Part> = pieces.filter_map(|p| Part::new(p, low, high)).collect();
+        let pieces: Vec<&BoundaryPiece> = pieces.collect();
+        if !pieces.iter().all(|p| is_tame(p)) {
+            return None;
+        }
+        let parts = pieces.iter().filter_map(|p| Part::new(p, low, high));
+        let parts: Vec<Part> = parts.collect();
         let per_height = 1.0 / (high - low);
         let far = wanted.reach / wanted.side;
         #[allow(clippy::cast_precision_loss, reason = "a count")]
@@ -138,6 +143,15 @@ impl Table {
     }
 }
 
+/// Whether places on a piece are known by its parameter as well as roundings go: not near the end of one that its weights
+/// draw all but there.
+fn is_tame(part: &BoundaryPiece) -> bool {
+    const MOST: f64 = 1e3;
+    let [_, _, weights] = part.piece.twin().rows();
+    let most = weights.iter().copied().fold(0.0, f64::max);
+    weights.iter().all(|&w| w * MOST >= most)
+}
+
 impl Builder<'_> {
     fn fill(&mut self) -> Option<()> {
         let mut breaks: Vec<f64> = self.parts.iter().flat_map(|p| p.s).collect();
@@ -153,13 +167,12 @@ impl Builder<'_> {
                 .collect();
             let beyond = self.beyond(middle);
             if active.is_empty() {
-                self.constant(beyond, q);
+                self.constant(beyond, q)?;
             } else {
                 self.varying([p, q], beyond, &active)?;
             }
         }
-        self.constant(0.0, f64::INFINITY);
-        Some(())
+        self.constant(0.0, f64::INFINITY)
     }
 
     /// Share of the height that pieces beyond `s` bound.
@@ -168,7 +181,11 @@ impl Builder<'_> {
         beyond.map(Part::whole).sum::<f64>() * self.per_height
     }
 
-    fn constant(&mut self, height: f64, to: f64) {
+    /// Adds a band of one height; `None` where no layer has such.
+    fn constant(&mut self, height: f64, to: f64) -> Option<()> {
+        if !(-LOST..=1.0 + LOST).contains(&height) {
+            return None;
+        }
         let snapped = if height.abs() <= self.table.rounding {
             0.0
         } else if (height - 1.0).abs() <= self.table.rounding {
@@ -188,6 +205,7 @@ impl Builder<'_> {
         if to.is_finite() {
             self.sum += 0.5 * snapped * (to - from);
         }
+        Some(())
     }
 
     fn push(&mut self, to: f64, band: Band) {
