@@ -384,7 +384,6 @@ fn no_sheet_where_faces_join() {
     }
 }
 
-/// A ring less the half of it that is told by the same profile is the other half.
 /// About a point where solids of one axis touch, both surfaces are boundary up to the point: what is between them is
 /// thinner than a rounding as far off as the root of one.
 #[test]
@@ -416,6 +415,25 @@ fn surfaces_that_touch_on_the_axis() {
     }
 }
 
+/// Where the edges of three surfaces touch though the surfaces cross, what they leave between them is thinner than a
+/// rounding as far off as the root of one, and yet reaches up to the place.
+#[test]
+fn edges_that_touch_in_a_place() {
+    let text = "schema = 1\n[[solid]]\nkind = 'cylinder'\nradius = 1.5\nheight = 0.5\n\
+                axis = { origin = [-0.5, 0, 0.5], direction = [0, -1, 0] }\n\
+                [[solid]]\nkind = 'cylinder'\nradius = 1\nheight = 1.75\n\
+                axis = { origin = [0.5, 0.5, 0.5], direction = [0, -1, 0] }\n\
+                [[solid]]\nkind = 'torus'\nmajor = 1.75\nminor = 0.5\naxis = { origin = [0.25, -1, 0.5] }";
+    let scene = Scene::parse(text).expect("a scene");
+    for far in [0.0, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5] {
+        for z in [0.5 - far, 0.5 + far] {
+            let found = signed(&scene, [-0.5, 0.0, z]);
+            assert!(found.abs() <= far + 1e-11, "{found:e} at {far:e}");
+        }
+    }
+}
+
+/// A ring less the half of it that is told by the same profile is the other half.
 #[test]
 fn a_ring_less_its_half() {
     let text = "schema = 1\n[profiles.tube]\n\

@@ -217,10 +217,18 @@ fn row(looked: Looked<'_>, resolution: u32, volume: f64, offsets: u32) -> Result
         },
         volume_fraction_error: relative(total.fraction * voxel),
         volume_fraction_bound: (FRACTION_BOUND * count(total.touched) + rounding) * voxel / volume
-            + 1e-13,
+            + displacement(&grid),
         sdf_max_error: total.worst,
         sdf_mean_error: total.absolute / count(grid.voxel_count()),
     })
+}
+
+/// What the rounding of the grid's planes may change of a sum, as a share: far from the origin a voxel is not as wide as
+/// the spacing says.
+fn displacement(grid: &GridSpec) -> f64 {
+    let last = grid.origin() + grid.spacing() * DVec3::from(grid.dims().map(|n| n as f64));
+    let far = grid.origin().abs().max(last.abs()) / grid.spacing();
+    1e-13 + 8.0 * f64::EPSILON * far.max_element()
 }
 
 /// The grid moved by part `n` of a voxel, and a voxel longer so that it still covers what it did.

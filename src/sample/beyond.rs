@@ -7,7 +7,7 @@
 use super::composite::{BodyLayer, Composite};
 use super::layer::stored;
 use super::radial::Writing;
-use crate::solid::Nearest;
+use crate::solid::{Nearest, Vicinity};
 use glam::DVec3;
 use smallvec::SmallVec;
 
@@ -89,11 +89,18 @@ impl<'a> Layer<'a> {
 
     /// Finishes a block no wider than `side`: at once, or in quarters, or voxel by voxel.
     fn block(&self, block: Block, side: usize, out: &mut [f32]) {
-        if !self.is_doubted(block, out) {
+        // Distances beyond the band are not kept.
+        if self.band.is_finite()
+            && f64::from(least(block, self.composite.grid.dims()[0], out)) >= self.band
+        {
+            return;
+        }
+        let vicinity = self.vicinity(block);
+        if !self.is_doubted(block, &vicinity, out) {
             return;
         }
         if side <= SMALL {
-            self.voxels(block, out);
+            self.voxels(block, &vicinity, out);
             return;
         }
         let Block { from, to } = block;
@@ -109,34 +116,41 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Whether a body that decides somewhere in a block may have a hidden part of its surface as near.
-    fn is_doubted(&self, block: Block, out: &[f32]) -> bool {
+    fn vicinity(&self, block: Block) -> Vicinity<'a> {
         let Block { from, to } = block;
-        let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
-        for value in (block.rows(self.composite.grid.dims()[0])).flat_map(|row| &out[row]) {
-            least = least.min(value.abs());
-            most = most.max(value.abs());
-        }
-        // Distances beyond the band are not kept.
-        if f64::from(least) >= self.band {
-            return false;
-        }
-        let most = f64::from(most).min(self.band);
         let [first, last] = [
             self.centre(from[0], from[1]),
             self.centre(to[0] - 1, to[1] - 1),
         ];
-        let (middle, reach) = (0.5 * (first + last), 0.5 * (last - first).length());
-        let at = (from[1] + to[1]) / 2 * self.composite.grid.dims()[0] + (from[0] + to[0]) / 2;
-        (0..self.bodies.len()).any(|b| {
-            // A body that is further all over the block decides nowhere in it.
-            let own = f64::from(self.bodies[b].distances[at].abs());
-            own * (1.0 - ROUNDING) - self.room - 2.0 * reach <= most
-                && self.nearest.may_hide_foot(b, middle, reach)
-        })
+        // A hair more than the half diagonal, for rounding.
+        let reach = 0.5 * (last - first).length() + self.room;
+        Vicinity::new(self.nearest, 0.5 * (first + last), reach)
     }
 
-    fn voxels(&self, block: Block, out: &mut [f32]) {
+    /// Whether a body that decides somewhere in a block may have a hidden part of its surface as near.
+    fn is_doubted(&self, block: Block, vicinity: &Vicinity<'_>, out: &[f32]) -> bool {
+        let Block { from, to } = block;
+        let at = (from[1] + to[1]) / 2 * self.composite.grid.dims()[0] + (from[0] + to[0]) / 2;
+        let value = f64::from(out[at]);
+        // Where a factor decides it is the composite's distance. Both change by at most the way from the voxel, which is
+        // half a one from the middle or less.
+        let way = vicinity.reach() + 0.5 * self.composite.grid.spacing().length();
+        let room = 2.0 * (way + self.room) + ROUNDING * value.abs();
+        let factors = || {
+            self.composite
+                .assembly
+                .terms()
+                .iter()
+                .flat_map(|t| &t.factors)
+        };
+        let decides = |b: usize| {
+            let mut own = factors().filter(|f| f.body == b);
+            own.any(|&f| (f64::from(self.bodies[b].distance(f, at)) - value).abs() <= room)
+        };
+        (0..self.bodies.len()).any(|b| decides(b) && vicinity.may_hide_foot(b))
+    }
+
+    fn voxels(&self, block: Block, vicinity: &Vicinity<'_>, out: &mut [f32]) {
         let Block { from, to } = block;
         // Distances of the last row's voxels, where they were asked for.
         let mut before = [f64::INFINITY; SMALL];
@@ -146,7 +160,7 @@ impl<'a> Layer<'a> {
             let mut last = f64::INFINITY;
             for ((i, at), before) in (from[0]..to[0]).zip(row).zip(&mut before) {
                 let most = (last + spacing.x).min(*before + spacing.y);
-                last = self.voxel(self.centre(i, j), at, most, &mut out[at]);
+                last = self.voxel((self.centre(i, j), at), most, vicinity, &mut out[at]);
                 *before = last;
             }
         }
@@ -154,16 +168,19 @@ impl<'a> Layer<'a> {
 
     /// One voxel whose distance is known to be at most `most`, but for rounding. Gives its distance back where it was
     /// asked for.
-    fn voxel(&self, point: DVec3, at: usize, most: f64, value: &mut f32) -> f64 {
+    fn voxel(
+        &self,
+        (point, at): (DVec3, usize),
+        most: f64,
+        vicinity: &Vicinity<'_>,
+        value: &mut f32,
+    ) -> f64 {
         let size = f64::from(value.abs());
         if size >= self.band {
             return f64::INFINITY;
         }
         let own = |b: usize| f64::from(self.bodies[b].distances[at].abs());
-        let hidden = |b: usize| {
-            let far = self.at_most(own(b));
-            self.nearest.is_hidden_within(b, point, far)
-        };
+        let hidden = |b: usize| vicinity.is_hidden_within(b, point, self.at_most(own(b)));
         let all = || 0..self.bodies.len();
         let deciding = all().find(|&b| own(b).to_bits() == size.to_bits());
         if deciding.is_some_and(|b| !hidden(b)) {
@@ -185,8 +202,10 @@ impl<'a> Layer<'a> {
             limit = limit.min(own(b));
             break;
         }
-        let asked = |b: usize| open.contains(&b);
-        let distance = (self.nearest.distance_below(point, limit, asked)).max(size);
+        let comes_within = |b: usize, limit: f64| {
+            own(b) * (1.0 - ROUNDING) - self.room < limit && open.contains(&b)
+        };
+        let distance = (vicinity.distance_below(point, limit, comes_within)).max(size);
         *value = if *value <= 0.0 {
             stored(-distance.min(self.band) + 0.0)
         } else {
@@ -194,4 +213,10 @@ impl<'a> Layer<'a> {
         };
         distance
     }
+}
+
+/// The least distance in a block of a layer `nx` wide.
+fn least(block: Block, nx: usize, out: &[f32]) -> f32 {
+    let rows = block.rows(nx).flat_map(|row| &out[row]);
+    rows.fold(f32::INFINITY, |least, v| least.min(v.abs()))
 }

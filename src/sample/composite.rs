@@ -76,7 +76,7 @@ impl BodyLayer {
     }
 
     /// A voxel's signed distance from a factor's body, or from the complement.
-    fn distance(&self, factor: Factor, at: usize) -> f32 {
+    pub(super) fn distance(&self, factor: Factor, at: usize) -> f32 {
         let distance = self.distances[at];
         if factor.complement {
             -distance

@@ -48,6 +48,6 @@ pub use turn::Turn;
 pub(crate) use assembly::{Measured, Reaches, signed};
 pub(crate) use body::VoxelShape;
 pub(crate) use fraction::{SNAP, TOLERANCE};
-pub(crate) use nearest::Nearest;
+pub(crate) use nearest::{Nearest, Vicinity};
 pub(crate) use row::{Cuts, LayerCuts, Ring, Row};
 pub(crate) use terms::{Factor, Term};

@@ -177,13 +177,18 @@ fn turned(random: &mut Random) -> Body {
         7 => free(random, false),
         _ => {
             let count = 3 + random.below(4);
-            let points: Vec<[f64; 2]> = (0..count)
-                .map(|k| [random.between(0.3, 1.5), 0.5 * k as f64])
-                .collect();
-            let degree = 1 + random.below(3.min(count - 1));
-            let text = to_axis(&format!(
-                "{{ kind = 'interpolate', points = {points:?}, degree = {degree} }}"
-            ));
+            let text = loop {
+                let points: Vec<[f64; 2]> = (0..count)
+                    .map(|k| [random.between(0.3, 1.5), 0.5 * k as f64])
+                    .collect();
+                let degree = 1 + random.below(3.min(count - 1));
+                let text = to_axis(&format!(
+                    "{{ kind = 'interpolate', points = {points:?}, degree = {degree} }}"
+                ));
+                if rises(&text) {
+                    break text;
+                }
+            };
             let volume = swept(&text);
             profile(text, volume, 1.6_f64.max(0.5 * count as f64))
         }
@@ -229,14 +234,32 @@ fn free(random: &mut Random, bezier: bool) -> Body {
     }
 }
 
-/// The volume of a whole turn of a single loop, ∮ π r² dz over the oracle's pieces.
-fn swept(profile: &str) -> f64 {
+/// The oracle's region of a profile.
+fn region(profile: &str) -> super::support::oracle::Region {
     let text = format!(
         "schema = 1\n[profiles.p]\n{profile}\n[[solid]]\nkind = 'revolve'\nprofile = 'p'\n"
     );
     let model =
         parse_model(&text, SceneFormat::Toml, "drawn", Path::new(""), &[]).expect("a model");
-    let region = &Oracle::new(&model).solids[0].region;
+    Oracle::new(&model).solids.swap_remove(0).region
+}
+
+/// Whether a curve nowhere turns back on its way up, so that its loop cannot cross itself.
+fn rises(profile: &str) -> bool {
+    let region = region(profile);
+    region.small.iter().all(|chain| {
+        let own = chain.iter().filter(|piece| piece.control.len() > 2);
+        let heights: Vec<f64> = own
+            .flat_map(|piece| (0..=64).map(|k| blended(&piece.control, f64::from(k) / 64.0)))
+            .map(|h| h[1] / h[2])
+            .collect();
+        heights.is_sorted() || heights.is_sorted_by(|a, b| a >= b)
+    })
+}
+
+/// The volume of a whole turn of a single loop, ∮ π r² dz over the oracle's pieces.
+fn swept(profile: &str) -> f64 {
+    let region = region(profile);
     let mut sum = 0.0;
     for piece in region.small.iter().flatten() {
         let n = piece.control.len() - 1;

@@ -235,20 +235,28 @@ fn product(p: &[f64], q: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Roots in [0, 1] of a polynomial in Bernstein form, by halving where signs change; ends of where it
-/// is 0 as far as f64 goes are among them.
+/// Roots in [0, 1] of a polynomial in Bernstein form, by halving until signs change once, then by the
+/// Illinois form of false position; ends of where it is 0 as far as f64 goes are among them.
 fn roots(coefficients: Vec<f64>) -> Vec<f64> {
     let most = |c: &[f64]| c.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let nothing = 1e-15 * most(&coefficients);
     let mut found: Vec<f64> = Vec::new();
+    let whole = coefficients.clone();
     let mut open = vec![(0.0_f64, 1.0_f64, coefficients)];
     while let Some((low, high, c)) = open.pop() {
         let n = c.len();
-        if c.iter().all(|v| *v > 0.0) || c.iter().all(|v| *v < 0.0) {
+        let changes = c.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0));
+        let changes = changes.count();
+        if changes == 0 && c.iter().all(|v| *v != 0.0) {
             continue;
         }
         if high - low < 1e-15 || most(&c) <= nothing {
             found.extend([low, high]);
+            continue;
+        }
+        let ends = [c[0], c[n - 1]];
+        if changes == 1 && ends[0] * ends[1] < 0.0 && c.iter().all(|v| *v != 0.0) {
+            found.push(crossing(&whole, [low, high], ends));
             continue;
         }
         let (mut left, mut p) = (vec![c[0]], c);
@@ -264,6 +272,37 @@ fn roots(coefficients: Vec<f64>) -> Vec<f64> {
     }
     found.dedup_by(|a, b| (*a - *b).abs() < 1e-14);
     found
+}
+
+/// The one root of a polynomial between two places where its signs differ.
+fn crossing(whole: &[f64], [mut a, mut b]: [f64; 2], [mut f, mut g]: [f64; 2]) -> f64 {
+    for _ in 0..100 {
+        let c = (a * g - b * f) / (g - f);
+        let value = bernstein(whole, c);
+        if value == 0.0 || (b - a).abs().min((c - b).abs()) < 1e-15 {
+            return c;
+        }
+        if value * g < 0.0 {
+            (a, f) = (b, g);
+        } else {
+            f *= 0.5;
+        }
+        (b, g) = (c, value);
+    }
+    0.5 * (a + b)
+}
+
+/// De Casteljau's value.
+fn bernstein(coefficients: &[f64], t: f64) -> f64 {
+    let mut p = [0.0; 64];
+    let p = &mut p[..coefficients.len()];
+    p.copy_from_slice(coefficients);
+    for level in 1..p.len() {
+        for i in 0..p.len() - level {
+            p[i] = (1.0 - t) * p[i] + t * p[i + 1];
+        }
+    }
+    p[0]
 }
 
 /// The distance of a point to a piece.

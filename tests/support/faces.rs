@@ -379,13 +379,20 @@ impl Model {
             .collect()
     }
 
-    /// Whether faces that do not coincide touch there, relative to the size.
+    /// Whether faces that do not coincide touch there, or the curves in which three of them meet, relative to the size.
     pub(crate) fn touches(&self, p: DVec3, tolerance: f64) -> bool {
         let near = self.through(p, tolerance * self.size);
-        near.iter().any(|&a| {
-            near.iter().any(|&b| {
-                let (f, g) = (&self.faces[a], &self.faces[b]);
-                a < b && f.normal(p).cross(g.normal(p)).length() < 1e-3 && !self.coincide(a, b, p)
+        let normals: Vec<DVec3> = near.iter().map(|&f| self.faces[f].normal(p)).collect();
+        let across = |i: usize, j: usize| normals[i].cross(normals[j]);
+        (0..near.len()).any(|j| {
+            (0..j).any(|i| {
+                if across(i, j).length() < 1e-3 {
+                    return !self.coincide(near[i], near[j], p);
+                }
+                (0..i).any(|k| {
+                    let apart = across(k, i).length().min(across(k, j).length()) >= 1e-3;
+                    apart && across(i, j).dot(normals[k]).abs() < 1e-3
+                })
             })
         })
     }
@@ -426,6 +433,24 @@ impl Model {
                 }
             }
             all.extend(d.try_normalize());
+        }
+        if k > 3 {
+            // More planes than three have sectors that no such sum is in. Each is spanned by lines in which planes meet.
+            let mut rays = Vec::new();
+            for (i, a) in normals.iter().take(k).enumerate() {
+                for b in &normals[i + 1..k] {
+                    rays.extend(a.cross(*b).try_normalize());
+                }
+            }
+            rays.dedup_by(|a, b| a.cross(*b).length() < 1e-9);
+            for (i, &a) in rays.iter().enumerate() {
+                for (j, &b) in rays.iter().enumerate().skip(i + 1) {
+                    for &c in &rays[j + 1..] {
+                        let sums = [a + b + c, a + b - c, a - b + c, a - b - c];
+                        all.extend(sums.into_iter().filter_map(DVec3::try_normalize));
+                    }
+                }
+            }
         }
         // Between two that are nearly parallel that does not come into the narrow sector.
         for (i, a) in normals.iter().enumerate() {

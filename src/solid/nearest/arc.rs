@@ -2,9 +2,10 @@
 //!
 //! * Accuracy: of the nearest point, some roundings of the arc's length, beside what the arc differs from its curve.
 
-use super::boxes::{Boxes, NOWHERE};
+use super::boxes::{Boxes, NOWHERE, square_away};
 use crate::math::Aabb;
 use glam::DVec3;
+use smallvec::SmallVec;
 
 /// Degree of the polynomials.
 pub(super) const DEGREE: usize = 8;
@@ -197,6 +198,37 @@ impl ArcTree {
             best = best.min(arc.curve.nearest(p, arc.from, arc.to).0);
             best * best
         });
+        best
+    }
+
+    /// The arcs whose boxes come within `far` of a point, unless they are many.
+    pub(super) fn within<const N: usize>(&self, p: DVec3, far: f64) -> Option<SmallVec<[u32; N]>>
+    where
+        [u32; N]: smallvec::Array<Item = u32>,
+    {
+        let mut found = SmallVec::new();
+        let square = far * far;
+        let are_many = self.boxes.find(
+            |b| square_away(b, p) <= square,
+            |i| {
+                let is_full = found.len() == N;
+                #[allow(clippy::cast_possible_truncation, reason = "arcs are counted")]
+                found.push(i as u32);
+                is_full
+            },
+        );
+        (!are_many).then_some(found)
+    }
+
+    /// The distance to the nearest of some arcs, or the limit.
+    pub(super) fn distance_of(&self, arcs: &[u32], p: DVec3, limit: f64) -> f64 {
+        let mut best = limit;
+        for &i in arcs {
+            let arc = &self.arcs[i as usize];
+            if square_away(&arc.bounds, p) < best * best {
+                best = best.min(arc.curve.nearest(p, arc.from, arc.to).0);
+            }
+        }
         best
     }
 }

@@ -136,29 +136,38 @@ impl Boxes {
         found
     }
 
-    /// Whether there is a box for which something is so that is so for every box around it.
+    /// Calls `each` with the numbers of the boxes for which something is so that is so for every box around them, until
+    /// it says that it is done; gives back whether it did.
     #[inline]
-    pub(super) fn any(&self, so: impl Fn(&Aabb) -> bool) -> bool {
+    pub(super) fn find(
+        &self,
+        is_so: impl Fn(&Aabb) -> bool,
+        mut each: impl FnMut(usize) -> bool,
+    ) -> bool {
         let mut stack = SmallVec::<[u32; 64]>::new();
         stack.push(0);
         while let Some(node) = stack.pop() {
             let node = self.nodes[node as usize];
-            if !so(&node.bounds) {
+            if !is_so(&node.bounds) {
                 continue;
             }
             if node.count > 0 {
                 let range = node.first as usize..(node.first + node.count) as usize;
-                if self.items[range]
-                    .iter()
-                    .any(|&i| so(&self.boxes[i as usize]))
-                {
-                    return true;
+                for &i in &self.items[range] {
+                    let i = i as usize;
+                    if is_so(&self.boxes[i]) && each(i) {
+                        return true;
+                    }
                 }
             } else if node.first > 0 {
                 stack.extend([node.first, node.first + 1]);
             }
         }
         false
+    }
+
+    pub(super) fn item(&self, i: usize) -> &Aabb {
+        &self.boxes[i]
     }
 
     pub(super) fn is_empty(&self) -> bool {

@@ -19,6 +19,11 @@ const MOST_PARTS: u32 = 3000;
 const LOOKS: u64 = 16;
 /// Half length, as a share of the composite's size, of the parts that are told by their middles.
 const FLOOR: f64 = 1e-12;
+/// Greatest length, as a share of the composite's size, of what a surface that touches an arc hides of it for being
+/// thinner than a hair: a root of the hair where the two bend apart as circles do, its fourth root where they fit better.
+const GRAZE: f64 = 1e-3;
+/// What is not longer is no surface that lies on an arc, but one that bends away from it and touches it.
+const SHORT: f64 = 3e-6;
 
 /// What may change along an arc.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +52,22 @@ enum Met {
     /// All of the part is beyond a border.
     Beyond,
     Perhaps,
+}
+
+/// What a part of an arc is found to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sort {
+    Edge,
+    /// No edge as far as can be seen, but another surface is within two hairs all along.
+    Crowded,
+    Off,
+}
+
+/// A part of an arc that is told.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    range: [f64; 2],
+    sort: Sort,
 }
 
 type Changes = SmallVec<[Change; 16]>;
@@ -179,7 +200,7 @@ impl Clip<'_> {
         let (speed, curl) = (self.arc.curve.speed(), self.arc.curve.curl());
         let floor = FLOOR * self.scene.size;
         let mut work = vec![([self.arc.from, self.arc.to], all.clone())];
-        let mut kept: Option<[f64; 2]> = None;
+        let mut told: Vec<Told> = Vec::new();
         let mut seen = 0;
         while let Some(([from, to], changes)) = work.pop() {
             seen += 1;
@@ -220,10 +241,15 @@ impl Clip<'_> {
                 }
             }
             if off {
+                told.push(Told {
+                    range: [from, to],
+                    sort: Sort::Off,
+                });
                 continue;
             }
-            let told = open.is_empty() || 0.5 * (to - from) * speed <= floor || seen > MOST_PARTS;
-            if !told {
+            let is_told =
+                open.is_empty() || 0.5 * (to - from) * speed <= floor || seen > MOST_PARTS;
+            if !is_told {
                 // The changes that go along this part may end in it for its halves' sake.
                 if crowded {
                     open.clone_from(all);
@@ -232,18 +258,64 @@ impl Clip<'_> {
                 work.push(([from, middle], open));
                 continue;
             }
-            if !self.is_edge(middle, crowded || !open.is_empty()) {
-                continue;
-            }
+            let is_crowded = crowded || !open.is_empty();
+            let sort = if self.is_edge(middle, is_crowded) {
+                Sort::Edge
+            } else if is_crowded {
+                Sort::Crowded
+            } else {
+                Sort::Off
+            };
+            told.push(Told {
+                range: [from, to],
+                sort,
+            });
+        }
+        self.join(&mut told, all, speed);
+        let mut kept: Option<[f64; 2]> = None;
+        for part in told.iter().filter(|p| p.sort == Sort::Edge) {
+            let [from, to] = part.range;
             match &mut kept {
                 Some(last) if last[1] == from => last[1] = to,
-                _ => {
-                    self.keep(kept.replace([from, to]), out);
-                }
+                _ => self.keep(kept.replace([from, to]), out),
             }
         }
         self.keep(kept, out);
         Some(())
+    }
+
+    /// Counts short runs of crowded parts beside an edge as of the edge: what a third surface that grazes the arc leaves
+    /// there is thinner than a hair, and yet is there.
+    fn join(&self, told: &mut [Told], all: &Changes, speed: f64) {
+        let mut from = 0;
+        while from < told.len() {
+            let run = told[from..].iter().take_while(|p| p.sort == Sort::Crowded);
+            let to = from + run.count();
+            if to == from {
+                from += 1;
+                continue;
+            }
+            let is_edge = |i: usize| told.get(i).is_some_and(|p| p.sort == Sort::Edge);
+            let beside = from > 0 && is_edge(from - 1) || is_edge(to);
+            let range = [told[from].range[0], told[to - 1].range[1]];
+            let length = speed * (range[1] - range[0]) / self.scene.size;
+            if beside && length <= GRAZE && (length <= SHORT || !self.is_flush(all, range)) {
+                told[from..to].iter_mut().for_each(|p| p.sort = Sort::Edge);
+            }
+            from = to;
+        }
+    }
+
+    /// Whether a surface lies on most of a part, not just near it.
+    fn is_flush(&self, all: &Changes, [from, to]: [f64; 2]) -> bool {
+        const PLACES: u32 = 9;
+        let on = 4.0 * self.scene.touch();
+        all.iter().any(|&change| {
+            let places =
+                (0..PLACES).map(|k| from + (to - from) * (f64::from(k) + 0.5) / f64::from(PLACES));
+            let count = places.filter(|&s| self.value(change, s, 2.0 * on).abs() <= on);
+            4 * count.count() > 3 * PLACES as usize
+        })
     }
 
     fn is_edge(&self, s: f64, crowded: bool) -> bool {

@@ -25,6 +25,7 @@ mod feet;
 mod fences;
 mod sheet;
 mod trace;
+mod vicinity;
 mod visible;
 
 use super::body::Body;
@@ -38,6 +39,7 @@ use smallvec::SmallVec;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, OnceLock};
 use trace::Crossing;
+pub(crate) use vicinity::Vicinity;
 use visible::{Scene, Spot};
 
 /// Sizes whose squares are far from the ends of f64.
@@ -115,56 +117,6 @@ impl Nearest {
         let found = self.faces(p, limit, |_, _| true, |_| true);
         let is_so = found.is_finite() || *self.empty.get_or_init(|| cover::are_hidden(&self.scene));
         is_so.then(|| found.max(least))
-    }
-
-    /// The distance to what the bodies of which `asked` is so have on the boundary, or the limit where that is less.
-    /// Covers leave out most of what is hidden.
-    pub(crate) fn distance_below(
-        &self,
-        point: DVec3,
-        limit: f64,
-        asked: impl Fn(usize) -> bool,
-    ) -> f64 {
-        let p = point - self.middle;
-        let covers = self.covers();
-        let limit = self.edges.distance(p, limit);
-        self.faces(
-            p,
-            limit,
-            |b, limit| asked(b) && covers[b].visible.meet(p, limit),
-            |spot| {
-                let cover = &covers[spot.body];
-                cover.visible.meet(spot.point, 1e-9 * self.scene.size)
-            },
-        )
-    }
-
-    /// Whether the nearest point of a body's surface may be hidden from a point within `reach` of a place.
-    ///
-    /// With f the place's own foot, a point q of the surface is nearer to x than f only where
-    /// `|c - q|² - |c - f|² <= 2 |x - c| |f - q|`, as the difference of the squares is linear in x.
-    pub(crate) fn may_hide_foot(&self, body: usize, place: DVec3, reach: f64) -> bool {
-        let hidden = &self.covers()[body].hidden;
-        if hidden.is_empty() {
-            return false;
-        }
-        let c = place - self.middle;
-        let body = &self.scene.bodies[body];
-        let Some(foot) = body.foot(c, body.contains(c)) else {
-            return true;
-        };
-        let square = c.distance_squared(foot) * (1.0 + 1e-9);
-        hidden.any(|b| {
-            let aside = boxes::away(b, foot) + b.sides().length();
-            boxes::square_away(b, c) - square <= 2.0 * reach * aside
-        })
-    }
-
-    /// Whether a part of a body's surface that may be hidden is within `far` of a point.
-    #[inline]
-    pub(crate) fn is_hidden_within(&self, body: usize, point: DVec3, far: f64) -> bool {
-        let cover = &self.covers()[body];
-        cover.hidden.meet(point - self.middle, far)
     }
 
     fn covers(&self) -> &[Cover] {
