@@ -226,12 +226,12 @@ fn points_of_polylines_take_some_hundred_bytes() {
     let peak = |points: u32| {
         fs::write(t.path().join("wavy.csv"), wavy(points)).expect("written");
         let arguments = ["voxelize", &scene, "-o", &out, "--channels", "occupancy"];
-        let ended = run(&[&arguments[..], &["--dry-run", "--json"]].concat()).exits(0);
+        let ended = run(&[&arguments[..], &["--force", "--json"]].concat()).exits(0);
         ended.json()["peak_memory_bytes"].as_u64().expect("a peak")
     };
     let (few, many) = (10_000, 200_000);
     let each = (peak(many) - peak(few)) / u64::from(many - few);
-    assert!(each <= 450, "{each} bytes of a point");
+    assert!(each <= 200, "{each} bytes of a point");
 }
 
 #[test]
@@ -675,6 +675,9 @@ fn mutation(bases: &[Base], seed: u64, folder: &Path) {
             } else {
                 changed = mutated(text, &mut random);
             }
+            if std::env::var_os("VOXLATHE_SHOW").is_some() {
+                eprintln!("{changed}\n{sets:?}");
+            }
             let Ok(model) = parse_model(&changed, *format, "s.toml", &scenes, &sets) else {
                 return;
             };
@@ -762,7 +765,7 @@ fn some_mutations_are_refused_or_answered() {
     mutations(0..300);
 }
 
-/// `VOXLATHE_SEEDS=FROM..TO`, 0..100000 without it.
+/// `VOXLATHE_SEEDS=FROM..TO`, 0..100000 without it; `VOXLATHE_SHOW=1` prints the scenes.
 #[test]
 #[ignore = "some ten minutes"]
 fn mutations_are_refused_or_answered() {

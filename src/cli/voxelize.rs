@@ -131,7 +131,8 @@ pub(super) fn run(
         ..summary(&scene, &plan, &tally)
     };
     let placed = Instant::now();
-    let manifest = writer.finish(summary)?;
+    let resolved = |to: &mut dyn std::io::Write| scene.model().write_resolved_indented(to);
+    let manifest = writer.finish_with_scene(summary, &resolved)?;
     // The last files on their way to the disk, and the renames.
     let write = write + placed.elapsed().as_secs_f64();
     if let Some(said) = said_of_volume(&scene) {
@@ -658,7 +659,6 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         } else {
             Value::Null
         },
-        scene: scene.model().resolve(),
         ..StackSummary::default()
     }
 }

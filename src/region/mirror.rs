@@ -69,7 +69,8 @@ mod tests {
             heights().fold(f64::MAX, f64::min),
             heights().fold(f64::MIN, f64::max),
         );
-        is_mirrored(body.boundary(), 0.5 * (low + high) + away, tolerance)
+        let boundary: Vec<_> = body.boundary().iter().collect();
+        is_mirrored(&boundary, 0.5 * (low + high) + away, tolerance)
     }
 
     #[test]

@@ -35,7 +35,7 @@ use super::exr::{
 };
 use super::manifest::{
     ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, MaterialVolume,
-    SCHEMA, slice_name,
+    SCHEMA, WriteScene, slice_name,
 };
 use crate::grid::GridSpec;
 
@@ -309,6 +309,31 @@ impl StackWriter {
     /// [`IoError::LayerMissing`] when a layer was not written, [`IoError::Mismatch`] when a number
     /// in `summary` is not finite, and as [`StackDirectory::commit`].
     pub fn finish(self, summary: StackSummary) -> Result<Manifest, IoError> {
+        self.finish_with(summary, None)
+    }
+
+    /// As [`finish`](Self::finish), with the resolved scene as `scene` writes it instead of the summary's: the manifest
+    /// that is returned has none.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_with_scene(
+        self,
+        summary: StackSummary,
+        scene: &WriteScene<'_>,
+    ) -> Result<Manifest, IoError> {
+        let summary = StackSummary {
+            scene: serde_json::Value::Null,
+            ..summary
+        };
+        self.finish_with(summary, Some(scene))
+    }
+
+    fn finish_with(
+        self,
+        summary: StackSummary,
+        scene: Option<&WriteScene<'_>>,
+    ) -> Result<Manifest, IoError> {
         let path = self.directory.path().to_path_buf();
         let written = self
             .written
@@ -393,11 +418,20 @@ impl StackWriter {
             certainty: summary.certainty,
             scene: summary.scene,
         };
-        let bytes = manifest.to_bytes().map_err(|reason| IoError::Mismatch {
+        let mismatch = |reason| IoError::Mismatch {
             path: path.join(MANIFEST_NAME),
             reason,
-        })?;
-        self.directory.commit(&bytes)?;
+        };
+        match scene {
+            None => {
+                let bytes = manifest.to_bytes().map_err(mismatch)?;
+                self.directory.commit(&bytes)?;
+            }
+            Some(scene) => {
+                let write = manifest.written_with(scene).map_err(mismatch)?;
+                self.directory.commit_written(write)?;
+            }
+        }
         Ok(manifest)
     }
 
