@@ -135,6 +135,23 @@ pub struct StackSummary {
     pub scene: serde_json::Value,
 }
 
+/// What a stack takes on its disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expected {
+    /// Bytes of the layers that are written.
+    pub present: u64,
+    /// Bytes that the others and the manifest are expected to take.
+    pub rest: u64,
+}
+
+impl Expected {
+    /// Bytes of the whole.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.present.saturating_add(self.rest)
+    }
+}
+
 /// A stack while it is being written.
 ///
 /// Dropping it before [`finish`](Self::finish) leaves no trace of it.
@@ -290,6 +307,28 @@ impl StackWriter {
             ));
         }
         Ok(samples)
+    }
+
+    /// Bytes that the whole stack will take, judging by the layers that are written: one that is not is taken to be as
+    /// large as the two written ones about it are on average. With what these take already; `None` where there is none.
+    #[must_use]
+    pub fn expected_bytes(&self) -> Option<Expected> {
+        let written = self.written();
+        let mut sizes = written.layers.iter().map(|(&k, (file, _))| (k, file.bytes));
+        let mut before = sizes.next()?;
+        let present: u64 = written.layers.values().map(|(file, _)| file.bytes).sum();
+        let mut between = before.0 as u64 * before.1;
+        for (k, bytes) in sizes {
+            let missing = (k - before.0 - 1) as u64;
+            between = between.saturating_add(missing * (before.1 + bytes) / 2);
+            before = (k, bytes);
+        }
+        let layers = self.grid.dims()[2];
+        let after = (layers - 1 - before.0) as u64 * before.1;
+        let rest = (between.saturating_add(after))
+            .saturating_add(RECORD.saturating_mul(layers as u64))
+            .saturating_add(MANIFEST);
+        Some(Expected { present, rest })
     }
 
     /// Writes a file beside the slices; the manifest lists it too.
