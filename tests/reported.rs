@@ -169,6 +169,6 @@ fn what_all_but_coincides_is_answered() {
         let total = &found.json()["total"];
         let [volume, error] = [&total["volume"], &total["error_estimate"]["volume"]]
             .map(|v| v.as_f64().expect("a number"));
-        assert!(volume > 8000.0 && error < 1e-9 * volume, "{volume} {error}");
+        assert!(volume > 8000.0 && error < 2e-3 * volume, "{volume} {error}");
     }
 }
