@@ -161,7 +161,10 @@ fn what_all_but_coincides_is_answered() {
     assert_eq!(found.json()["ok"], true);
     assert_eq!(found.json()["disagree"], 0);
     let block = fs::read_to_string(shipped("graded_block")).expect("a scene");
-    let heavy = block.replace(" 0.75, 1, 1,", " 750.0, 1, 1,");
+    let heavy = block.replace(
+        "0.75, 1, 1, 1, 1, 1, 1, 1, 1]",
+        "750.0, 1, 1, 1, 1, 1, 1, 1, 1]",
+    );
     assert_ne!(block, heavy);
     for text in [block, heavy] {
         fs::write(&from, text).expect("written");
