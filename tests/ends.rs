@@ -515,6 +515,7 @@ fn a_flipped_bit_anywhere_in_a_stack_is_found() {
         }
         fs::write(&path, good).expect("written");
     }
+    eprintln!("{flipped} flipped bits are found");
     run(&["info", &out]).exits(0);
 }
 

@@ -21,7 +21,7 @@ pub(crate) fn is_mirrored(boundary: &[BoundaryPiece], middle: f64, tolerance: f6
     if boundary.len() > MOST_PIECES {
         return false;
     }
-    let points: Vec<_> = boundary.iter().map(|b| points(&b.piece)).collect();
+    let points: Vec<_> = boundary.iter().map(|b| points(b.piece)).collect();
     are_paired(&points, middle, tolerance)
 }
 

@@ -291,7 +291,7 @@ fn output(model: &OutputModel) -> Node<'static> {
 fn profile(model: &ProfileModel) -> Node<'_> {
     let loops = match model.loops.as_slice() {
         [] => NOTHING,
-        loops => loops.iter().map(chain).collect(),
+        loops => loops.iter().map(|l| chain(l)).collect(),
     };
     object([
         ("boundary", json!(model.boundary.name())),
@@ -302,12 +302,15 @@ fn profile(model: &ProfileModel) -> Node<'_> {
             "across",
             unless(model.across == Across::Refuse, json!(model.across.name())),
         ),
-        ("curves", model.curves.as_ref().map_or(NOTHING, chain)),
+        (
+            "curves",
+            model.curves.as_ref().map_or(NOTHING, |c| chain(c)),
+        ),
         ("loops", loops),
     ])
 }
 
-fn chain(curves: &Vec<CurveModel>) -> Node<'_> {
+fn chain(curves: &[CurveModel]) -> Node<'_> {
     curves.iter().map(curve).collect()
 }
 
