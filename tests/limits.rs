@@ -729,8 +729,8 @@ fn worked() -> u64 {
     10 * ticks.filter_map(|t| t.parse::<u64>().ok()).sum::<u64>()
 }
 
-/// Goes through seeds; none may panic, take 20 s of work or bring the process to 1 GiB. What takes a minute of work, or
-/// stands still for ten, ends them all.
+/// Goes through seeds; none may panic, take 20 s both of work and on the wall, or bring the process to 1 GiB. What takes a
+/// minute of work, or ten on the wall, ends them all.
 fn mutations(seeds: std::ops::Range<u64>) {
     /// The seed that is at work, and since how many milliseconds of work and on the wall; for the one that watches.
     static AT: [AtomicU64; 3] = [const { AtomicU64::new(u64::MAX) }; 3];
@@ -752,12 +752,12 @@ fn mutations(seeds: std::ops::Range<u64>) {
     let mut failed = Vec::new();
     let (mut slowest, count) = ((0, 0), seeds.end - seeds.start);
     for seed in seeds {
-        let start = worked();
-        AT[2].store(now(), Ordering::SeqCst);
+        let (start, wall) = (worked(), now());
+        AT[2].store(wall, Ordering::SeqCst);
         AT[1].store(start, Ordering::SeqCst);
         AT[0].store(seed, Ordering::SeqCst);
         let found = catch_unwind(AssertUnwindSafe(|| mutation(&bases, seed, folder.path())));
-        let took = worked() - start;
+        let took = (worked() - start).min(now() - wall);
         slowest = slowest.max((took, seed));
         if found.is_err() || took > 20_000 || told(OWN, "VmHWM:") > 1 << 20 {
             failed.push((seed, took));
