@@ -1,6 +1,7 @@
 //! Runs that do not come to their end: killed, told to end, or refused by the system.
 //!
-//! `VOXLATHE_MOMENTS` sets at how many random moments each command is stopped; `VOXLATHE_SEED` which.
+//! `VOXLATHE_MOMENTS` sets at how many random moments each command is stopped; `VOXLATHE_SEED` which. `VOXLATHE_FLIPS` sets
+//! how many bits of each file of a stack with previews are flipped.
 
 #![cfg(unix)]
 
@@ -13,9 +14,13 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use glam::DVec3;
 use rustix::process::{Pid, Signal, kill_process};
 use support::{below, interruptible_command, names_in, run, scratch, shipped, write_npy};
-use voxlathe::io::{Manifest, verify_stack};
+use voxlathe::grid::GridSpec;
+use voxlathe::io::exr::{LayerChannels, SampleKind};
+use voxlathe::io::stack::{ChannelSpec, StackOptions, StackSummary};
+use voxlathe::io::{Manifest, StackWriter, verify_stack};
 
 fn number(name: &str, default: u64) -> u64 {
     let text = std::env::var(name).unwrap_or_default();
@@ -55,6 +60,24 @@ fn send(child: &Child, signal: Signal) {
     let pid = Pid::from_raw(i32::try_from(child.id()).expect("a small id")).expect("an id");
     // A process that has just ended cannot be told any more.
     let _ = kill_process(pid, signal);
+}
+
+/// Waits until the child is the command itself and asks to be told of signals: before, whatever has been started for it
+/// is killed, and there is nothing to clean up. Where the system does not tell, a moment.
+fn listens(child: &mut Child, signal: Signal) {
+    let status = format!("/proc/{}/status", child.id());
+    let begin = Instant::now();
+    while child.try_wait().expect("a child to wait for").is_none() {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let caught = text.lines().find_map(|l| l.strip_prefix("SigCgt:"));
+        let caught = caught.and_then(|c| u64::from_str_radix(c.trim(), 16).ok());
+        let bit = 1 << (signal.as_raw() - 1);
+        let late = begin.elapsed() > Duration::from_secs(10);
+        if caught.is_none() || caught.is_some_and(|c| c & bit != 0) || late {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Waits for the end, at most so long.
@@ -278,7 +301,8 @@ fn every_command_ends_within_a_second_of_a_signal() {
                 .stderr(Stdio::null())
                 .spawn()
                 .expect("the command starts");
-            std::thread::sleep(Duration::from_secs_f64(0.03 + 1.2 * random.next()));
+            listens(&mut child, signal);
+            std::thread::sleep(Duration::from_secs_f64(1.2 * random.next()));
             let early = child.try_wait().expect("a child to wait for");
             let sent = Instant::now();
             send(&child, signal);
@@ -462,7 +486,65 @@ fn an_edited_file_is_refused_before_any_work() {
     run(&again).exits(0);
 }
 
-/// Every byte of every file of a stack with its pictures: a bit of each, or of a share of the larger files.
+/// Flips bits of a file of a stack, one at a time, each so many after the one before; how many. Every one must be found.
+fn flip(out: &Path, name: &str, apart: usize) -> usize {
+    let path = out.join(name);
+    let good = fs::read(&path).expect("a file");
+    let bits = (0..8 * good.len()).step_by(apart.max(1));
+    let flipped = bits.map(|bit| {
+        let mut bytes = good.clone();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        fs::write(&path, bytes).expect("written");
+        let found = verify_stack(out);
+        assert!(!found.is_ok_and(|r| r.is_intact()), "{name}, bit {bit}");
+    });
+    let flipped = flipped.count();
+    fs::write(&path, good).expect("written");
+    flipped
+}
+
+/// Every bit of every byte of a small stack: two layers with all channels, and two small pictures in the previews' place.
+#[test]
+fn every_flipped_bit_of_a_small_stack_is_found() {
+    let t = scratch();
+    let (out, picture) = (t.path().join("out"), below(&t, "p.png"));
+    let size = ["--width", "16", "--height", "16"];
+    let arguments = ["render", &shipped("torus"), "-o", &picture];
+    run(&[&arguments[..], &size].concat()).exits(0);
+    let picture = fs::read(picture).expect("a picture");
+    let grid = GridSpec::new([3, 2, 2], DVec3::splat(-0.5), DVec3::splat(0.5)).expect("a grid");
+    let kinds = [
+        ("occupancy", SampleKind::Half),
+        ("fraction", SampleKind::Float),
+        ("sdf", SampleKind::Float),
+        ("material", SampleKind::Uint),
+    ];
+    let channels = kinds.map(|(name, kind)| ChannelSpec::named(name, kind, "m"));
+    let writer = StackWriter::create(&out, &grid, channels.to_vec(), StackOptions::default());
+    let writer = writer.expect("a stack");
+    for k in 0..2 {
+        let layer = LayerChannels {
+            occupancy: Some(&[1, 0, 0, 1, 0, 0]),
+            fraction: Some(&[0.75, 0.25, 0.0, 1.0, 0.0, 0.0]),
+            sdf: Some(&[-0.1, 0.1, 0.5, -0.2, 0.2, 1.5]),
+            material: Some(&[1, 0, 0, 2, 0, 0]),
+        };
+        writer.write_layer(k, &layer).expect("a layer");
+    }
+    for name in ["preview.png", "preview-slices.png"] {
+        writer.write_other(name, &picture).expect("a picture");
+    }
+    writer.finish(StackSummary::default()).expect("a stack");
+    let report = verify_stack(&out).expect("a stack");
+    assert!(report.is_intact(), "{report:?}");
+    let flipped: usize = (names_in(&out).iter())
+        .map(|name| flip(&out, name, 1))
+        .sum();
+    eprintln!("{flipped} flipped bits are found");
+    assert!(verify_stack(&out).expect("a stack").is_intact());
+}
+
+/// Bytes of every file of a stack with the previews that the command draws.
 #[test]
 fn a_flipped_bit_anywhere_in_a_stack_is_found() {
     let t = scratch();
@@ -477,18 +559,12 @@ fn a_flipped_bit_anywhere_in_a_stack_is_found() {
         "--preview",
     ];
     run(&arguments).exits(0);
-    let flips = usize::try_from(number("VOXLATHE_FLIPS", 150)).expect("a count");
+    let flips = number("VOXLATHE_FLIPS", 150).max(1);
     for name in names_in(&out) {
-        let path = t.path().join("out").join(&name);
-        let good = fs::read(&path).expect("a file");
-        for bit in (0..8 * good.len()).step_by((8 * good.len()).div_ceil(flips)) {
-            let mut bytes = good.clone();
-            bytes[bit / 8] ^= 1 << (bit % 8);
-            fs::write(&path, bytes).expect("written");
-            let found = verify_stack(&out);
-            assert!(!found.is_ok_and(|r| r.is_intact()), "{name}, bit {bit}");
-        }
-        fs::write(&path, good).expect("written");
+        let at = t.path().join("out");
+        let bits = 8 * fs::metadata(at.join(&name)).expect("a file").len();
+        let apart = usize::try_from(bits.div_ceil(flips)).expect("a small file");
+        flip(&at, &name, apart);
     }
     run(&["info", &out]).exits(0);
 }

@@ -71,6 +71,8 @@ fn every_voxel_of_a_cylinder_whose_axis_is_in_the_lattices_planes() {
     }
     eprintln!("worst voxel off by {worst:e}");
     assert!(worst < 1e-6, "{worst:e}");
+    let one = f64::from(found[11 + 16 * (13 + 16 * 5)]);
+    assert!((one - 0.445_087_975).abs() < 1e-8 + 1e-7, "{one}");
     let sum: f64 = found.iter().map(|f| f64::from(*f)).sum::<f64>() * h.powi(3);
     assert!((sum - 4.5 * PI).abs() < 1e-7 * 4.5 * PI, "{sum}");
 }

@@ -25,8 +25,8 @@ use crate::scene::{
 use crate::solid::{Operation, Part, Scalar};
 use serde_json::{Value, json};
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Everything decided before the first voxel.
@@ -44,6 +44,8 @@ struct Plan {
     layer_bytes: u64,
     workers: usize,
     stack_bytes: u64,
+    /// What it is expected to take, where that is known.
+    expected_bytes: Option<u64>,
 }
 
 /// Seconds by stage.
@@ -106,7 +108,14 @@ pub(super) fn run(
         plan.channels.clone(),
         options,
     )?;
-    let (sample, write, tally, fraction_sum) = stream(&sampler, &plan, &writer, console)?;
+    let Streamed {
+        sample,
+        write,
+        tally,
+        fraction_sum,
+        expected,
+    } = stream(&sampler, &plan, &writer, arguments, console)?;
+    plan.expected_bytes = expected.or(plan.expected_bytes);
     let Ways {
         flux,
         sections,
@@ -131,7 +140,8 @@ pub(super) fn run(
         ..summary(&scene, &plan, &tally)
     };
     let placed = Instant::now();
-    let manifest = writer.finish(summary)?;
+    let resolved = |to: &mut dyn std::io::Write| scene.model().write_resolved_indented(to);
+    let manifest = writer.finish_with_scene(summary, &resolved)?;
     // The last files on their way to the disk, and the renames.
     let write = write + placed.elapsed().as_secs_f64();
     if let Some(said) = said_of_volume(&scene) {
@@ -290,6 +300,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         layer_bytes,
         workers: 1,
         stack_bytes,
+        expected_bytes: (compression == Compression::None).then_some(stack_bytes),
     };
     // What is too large without its tables is not worth making them.
     plan.room()?;
@@ -376,8 +387,8 @@ fn kind(model: &ChannelModel) -> SampleKind {
     }
 }
 
-/// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand:
-/// what remains of the samples at best is assumed there.
+/// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand: what remains of the
+/// samples at best is assumed there, and [`check_rest`] looks again when some layers tell more.
 fn check_disk(
     arguments: &Voxelize,
     compression: Compression,
@@ -391,16 +402,44 @@ fn check_disk(
         stack_bytes / BEST
     };
     let available = available_bytes(&arguments.output)?;
-    if needed > available {
-        return Err(Error::TooLarge {
-            what: format!("the stack in {}", arguments.output.display()),
-            needed,
-            available,
-            remedy: "lower the resolution, choose fewer channels or another disk".into(),
-        }
-        .into());
-    }
+    refuse_beyond(arguments, needed, available)?;
     Ok(())
+}
+
+/// Refuses what will not fit by what the layers take that were written first; how much the whole is expected to take.
+fn check_rest(arguments: &Voxelize, writer: &StackWriter) -> Result<Option<u64>, Error> {
+    let Some(expected) = writer.expected_bytes() else {
+        return Ok(None);
+    };
+    let room = available_bytes(&arguments.output)?.saturating_add(expected.present);
+    refuse_beyond(arguments, expected.total(), room)?;
+    Ok(Some(expected.total()))
+}
+
+fn refuse_beyond(arguments: &Voxelize, needed: u64, available: u64) -> Result<(), Error> {
+    if needed <= available {
+        return Ok(());
+    }
+    Err(Error::TooLarge {
+        what: format!("the stack in {}", arguments.output.display()),
+        needed,
+        available,
+        remedy: "lower the resolution, choose fewer channels or another disk".into(),
+    })
+}
+
+/// The layers in the order in which they are made, and how many come first: some of all heights, where what a layer takes
+/// on the disk is told by no more than its making.
+fn order(layers: usize, compression: Compression) -> (Vec<usize>, usize) {
+    /// Of a solid that starts at once, half of a step is missed or taken in excess: an 128th of its height.
+    const FIRST: usize = 64;
+    let count = (layers / 4).clamp(1, FIRST);
+    if compression == Compression::None || layers < 8 {
+        return ((0..layers).collect(), 0);
+    }
+    let first: Vec<usize> = (0..=count).map(|i| i * (layers - 1) / count).collect();
+    let others = (0..layers).filter(|k| first.binary_search(k).is_err());
+    (first.iter().copied().chain(others).collect(), first.len())
 }
 
 /// Distances are stored as f32: the grid must not leave its range.
@@ -438,10 +477,14 @@ fn stream(
     sampler: &LayerSampler<'_>,
     plan: &Plan,
     writer: &StackWriter,
+    arguments: &Voxelize,
     console: &Console,
-) -> Result<(f64, f64, Tally, f64), Failure> {
+) -> Result<Streamed, Failure> {
     let workers = plan.workers;
     let layers = plan.grid.dims()[2];
+    let (order, first) = order(layers, plan.compression);
+    let missing = AtomicUsize::new(first);
+    let expected = Mutex::new(None);
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
     let failed = AtomicBool::new(false);
@@ -470,12 +513,15 @@ fn stream(
         let scalars = names.zip(&buffers.scalars);
         samples.extend(scalars.map(|(c, values)| (c.name.as_str(), Samples::Float(values))));
         writer.write_samples(k, &samples)?;
-        let mut all = tally
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut all = tally.lock().unwrap_or_else(PoisonError::into_inner);
         all.0.add(&buffers.tally);
         all.1[k] = buffers.fraction_sum;
         drop(all);
+        // The one that has made the last of the first layers looks.
+        if order[..first].contains(&k) && missing.fetch_sub(1, Ordering::AcqRel) == 1 {
+            let found = check_rest(arguments, writer)?;
+            *expected.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        }
         for (total, time) in nanoseconds.iter().zip([sampled - begin, sampled.elapsed()]) {
             total.fetch_add(
                 u64::try_from(time.as_nanos()).unwrap_or(u64::MAX),
@@ -490,15 +536,12 @@ fn stream(
             scope.spawn(|_| {
                 let mut buffers = LayerBuffers::default();
                 while !failed.load(Ordering::Relaxed) {
-                    let k = next.fetch_add(1, Ordering::Relaxed);
-                    if k >= layers {
+                    let Some(&k) = order.get(next.fetch_add(1, Ordering::Relaxed)) else {
                         break;
-                    }
+                    };
                     if let Err(error) = work(&mut buffers, k) {
                         failed.store(true, Ordering::Relaxed);
-                        let mut first = failure
-                            .lock()
-                            .unwrap_or_else(std::sync::PoisonError::into_inner);
+                        let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
                         first.get_or_insert(error);
                     }
                 }
@@ -506,21 +549,36 @@ fn stream(
         }
     });
     bar.finish_and_clear();
-    if let Some(error) = failure
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
-    {
+    if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(error.into());
     }
     // Thread time over the number of workers: the share of the wall time each stage took.
     #[allow(clippy::cast_precision_loss, reason = "times and counts")]
     let [sample, write] = nanoseconds.map(|n| n.into_inner() as f64 * 1e-9 / workers as f64);
-    let (tally, sums) = tally
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (tally, sums) = tally.into_inner().unwrap_or_else(PoisonError::into_inner);
     // In the order of the layers, whoever sampled them.
     let fraction_sum = sums.iter().sum();
-    Ok((sample, write, tally, fraction_sum))
+    Ok(Streamed {
+        sample,
+        write,
+        tally,
+        fraction_sum,
+        expected: expected
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner),
+    })
+}
+
+/// What became of the layers.
+struct Streamed {
+    /// Seconds of the wall time.
+    sample: f64,
+    /// Seconds of the wall time.
+    write: f64,
+    tally: Tally,
+    fraction_sum: f64,
+    /// Bytes that the stack was expected to take when some layers were made.
+    expected: Option<u64>,
 }
 
 /// Draws the preview's two pictures beside the slices; the manifest lists them.
@@ -658,7 +716,6 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         } else {
             Value::Null
         },
-        scene: scene.model().resolve(),
         ..StackSummary::default()
     }
 }
@@ -684,6 +741,7 @@ fn document(
         "files": manifest.map(|m| m.files.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()),
         "bytes": manifest.map(|m| m.files.iter().map(|f| f.bytes).sum::<u64>()),
         "bytes_uncompressed": plan.stack_bytes,
+        "bytes_expected": plan.expected_bytes,
         "memory_bytes": plan.memory_bytes(),
         "voxels_inside": manifest.and_then(|m| m.voxels_inside),
         "volume_occupancy": manifest.and_then(|m| m.volume_occupancy),

@@ -9,7 +9,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::Read as _;
+use std::io::{self, BufWriter, Read as _, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,8 @@ pub const SCHEMA: u32 = 1;
 
 /// What the JSON of a manifest ends with before its digest is put there.
 const OBJECT_END: &[u8] = b"\n}";
+/// What it ends with where there is no scene.
+const NO_SCENE: &[u8] = b"null\n}";
 /// What stands before the digits of the digest, which is that of everything up to them.
 const DIGEST_KEY: &[u8] = b",\n  \"manifest_blake3\": \"";
 /// What stands after them.
@@ -176,6 +178,46 @@ impl Manifest {
         self.check()?;
         let bytes = serde_json::to_vec_pretty(self).map_err(|e| e.to_string())?;
         Ok(with_digest(bytes))
+    }
+
+    /// What its bytes begin with, up to the scene.
+    ///
+    /// # Errors
+    /// As [`to_bytes`](Self::to_bytes).
+    fn head(&self) -> Result<Vec<u8>, String> {
+        self.check()?;
+        let without = Self {
+            scene: serde_json::Value::Null,
+            ..self.clone()
+        };
+        let mut bytes = serde_json::to_vec_pretty(&without).map_err(|e| e.to_string())?;
+        bytes.truncate(bytes.len() - NO_SCENE.len());
+        Ok(bytes)
+    }
+
+    /// What writes the bytes of `manifest.json` with the scene that `scene` writes as indented JSON instead of its own:
+    /// one may be so long that its text and its tree are not to be held beside it.
+    ///
+    /// # Errors
+    /// As [`to_bytes`](Self::to_bytes).
+    pub(super) fn written_with<'a>(
+        &self,
+        scene: &'a WriteScene<'a>,
+    ) -> Result<impl FnOnce(&mut File) -> io::Result<()> + 'a, String> {
+        let head = self.head()?;
+        Ok(move |file: &mut File| {
+            let mut whole = Digested {
+                to: BufWriter::new(file),
+                digest: blake3::Hasher::new(),
+            };
+            whole.write_all(&head)?;
+            scene(&mut Indented(&mut whole))?;
+            whole.write_all(DIGEST_KEY)?;
+            let Digested { mut to, digest } = whole;
+            to.write_all(digest.finalize().to_hex().as_bytes())?;
+            to.write_all(END)?;
+            to.flush()
+        })
     }
 
     /// The manifest in `bytes`.
@@ -333,6 +375,46 @@ pub(super) fn with_digest(mut object: Vec<u8>) -> Vec<u8> {
     object.extend(digest.bytes());
     object.extend(END);
     object
+}
+
+/// Writes a scene as indented JSON.
+pub type WriteScene<'a> = dyn Fn(&mut dyn Write) -> io::Result<()> + 'a;
+
+/// What goes on to a writer, with its digest.
+struct Digested<W> {
+    to: W,
+    digest: blake3::Hasher,
+}
+
+impl<W: Write> Write for Digested<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.to.write(bytes)?;
+        self.digest.update(&bytes[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// Indented JSON that goes on as a value of an object.
+struct Indented<W>(W);
+
+impl<W: Write> Write for Indented<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for line in bytes.split_inclusive(|&b| b == b'\n') {
+            self.0.write_all(line)?;
+            if line.ends_with(b"\n") {
+                self.0.write_all(b"  ")?;
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// A manifest's bytes up to the digits of its own digest, and these.
@@ -503,6 +585,27 @@ pub(super) mod tests {
         );
         assert_eq!(Manifest::from_bytes(&bytes), Ok(manifest.clone()));
         assert_eq!(manifest.to_bytes().unwrap(), bytes);
+    }
+
+    #[test]
+    fn a_scene_that_is_written_piece_by_piece_gives_the_same_bytes() {
+        let mut manifest = example();
+        manifest.scene = serde_json::json!({
+            "schema": 1, "name": "a\nb", "none": [], "profiles": { "p": { "points": [[1.5, 2], [-0.0, 1e300]] } },
+        });
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("m");
+        let scene = manifest.scene.clone();
+        let write = |to: &mut dyn Write| Ok(serde_json::to_writer_pretty(to, &scene)?);
+        for own in [serde_json::Value::Null, scene.clone()] {
+            let without = Manifest {
+                scene: own,
+                ..manifest.clone()
+            };
+            let mut file = File::create(&path).unwrap();
+            without.written_with(&write).unwrap()(&mut file).unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), manifest.to_bytes().unwrap());
+        }
     }
 
     #[test]

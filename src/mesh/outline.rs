@@ -30,7 +30,7 @@
 
 use crate::math::bernstein;
 use crate::math::{Dd, Real};
-use crate::region::{BoundaryPiece, Box2, BoxTree, Piece, SAME_FACE, welded};
+use crate::region::{Box2, BoxTree, FilledPieces, Piece, SAME_FACE, welded};
 use robust::{Coord, orient2d};
 use std::cmp::Ordering;
 
@@ -64,22 +64,22 @@ const SLIVER: f64 = 1e-3;
 impl Outline {
     /// The polygons of a boundary within `tolerance` of it, of at most `most` chords.
     pub(super) fn new(
-        boundary: &[BoundaryPiece],
+        boundary: &FilledPieces,
         tolerance: f64,
         most: usize,
     ) -> Result<Self, NoOutline> {
-        let first = boundary.first().map_or([0.0; 2], |b| b.piece.bounds().min);
+        let first = (boundary.iter().next()).map_or([0.0; 2], |b| b.piece.bounds().min);
         // Where curves touch without crossing, parts too short to tell inside from outside are missing.
-        let pieces = welded(boundary.to_vec(), SAME_FACE).unwrap_or_else(|| boundary.to_vec());
+        let pieces = welded(boundary.clone(), SAME_FACE).unwrap_or_else(|| boundary.clone());
         let mut points = Points::new(&pieces);
         let mut error = 0.0_f64;
         let mut chords: Vec<[u32; 2]> = Vec::new();
         for (k, bounding) in pieces.iter().enumerate() {
             let ends = points.ends[k];
-            let inner = parameters(&bounding.piece, tolerance, most - chords.len(), &mut error)?;
+            let inner = parameters(bounding.piece, tolerance, most - chords.len(), &mut error)?;
             let mut run = vec![ends[0]];
             for t in inner {
-                run.extend(points.inner(&bounding.piece, t, run[run.len() - 1], ends[1]));
+                run.extend(points.inner(bounding.piece, t, run[run.len() - 1], ends[1]));
             }
             run.push(ends[1]);
             if !bounding.forward {
@@ -244,12 +244,12 @@ struct Points {
 }
 
 impl Points {
-    fn new(pieces: &[BoundaryPiece]) -> Self {
+    fn new(pieces: &FilledPieces) -> Self {
         let mut order: Vec<(usize, usize)> =
             (0..pieces.len()).flat_map(|k| [(k, 0), (k, 1)]).collect();
         let at = |&(k, e): &(usize, usize)| {
-            let piece = &pieces[k].piece;
-            if e == 0 { piece.start } else { piece.end }
+            let piece = pieces.at(k).piece;
+            if e == 0 { piece.start() } else { piece.end() }
         };
         let compare = |a: [Dd; 2], b: [Dd; 2]| {
             let by = |c: usize| a[c].partial_cmp(&b[c]).unwrap_or(Ordering::Equal);

@@ -69,9 +69,9 @@ pub(crate) fn arcs(
     most: usize,
     out: &mut Vec<Arc>,
 ) -> bool {
-    let piece = &boundary.piece;
+    let piece = boundary.piece;
     let first = out.len();
-    let ends = [piece.start, piece.end].map(|p| p.map(Real::f64));
+    let ends = [piece.start(), piece.end()].map(|p| p.map(Real::f64));
     let whole = if piece.degree() == 1 {
         out.extend(Arc::segment(ends[0], ends[1]));
         true
@@ -138,7 +138,7 @@ struct Part {
 impl Part {
     fn new(piece: &Piece) -> Self {
         let half = Dd::of(0.5);
-        let origin = [0, 1].map(|c| ((piece.start[c] + piece.end[c]) * half).f64());
+        let origin = [0, 1].map(|c| ((piece.start()[c] + piece.end()[c]) * half).f64());
         let weight = piece.point(0)[2].f64();
         let coordinates = [0, 1, 2].map(|c| {
             let about = |p: [Dd; 3]| match c {

@@ -14,14 +14,64 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A piece of a region's boundary.
-#[derive(Debug, Clone)]
-pub(crate) struct BoundaryPiece {
-    pub(crate) piece: Arc<Piece>,
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BoundaryPiece<'a> {
+    pub(crate) piece: &'a Piece,
     /// Whether the region lies on the left of the piece's own direction.
     pub(crate) forward: bool,
 }
 
-impl BoundaryPiece {
+/// The pieces of a region's boundary, in order.
+#[derive(Debug, Clone)]
+pub(crate) struct FilledPieces {
+    /// The pieces that were filled, where all of them bound the region and none was cut: a profile may have very many.
+    pieces: Arc<Vec<Piece>>,
+    forward: Vec<bool>,
+}
+
+impl FilledPieces {
+    /// The pieces with whether the region lies on the left of each.
+    pub(super) fn new(mut pieces: Vec<Piece>, mut forward: Vec<bool>) -> Self {
+        pieces.shrink_to_fit();
+        forward.shrink_to_fit();
+        Self {
+            pieces: Arc::new(pieces),
+            forward,
+        }
+    }
+
+    /// The pieces without their sides.
+    pub(super) fn shared(&self) -> &Arc<Vec<Piece>> {
+        &self.pieces
+    }
+
+    /// The pieces without their sides, and these.
+    pub(super) fn into_parts(self) -> (Arc<Vec<Piece>>, Vec<bool>) {
+        (self.pieces, self.forward)
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// The piece of that number.
+    #[inline]
+    pub(crate) fn at(&self, i: usize) -> BoundaryPiece<'_> {
+        BoundaryPiece {
+            piece: &self.pieces[i],
+            forward: self.forward[i],
+        }
+    }
+
+    /// The pieces in order.
+    #[inline]
+    pub(crate) fn iter(&self) -> impl ExactSizeIterator<Item = BoundaryPiece<'_>> + Clone {
+        let both = self.pieces.iter().zip(&self.forward);
+        both.map(|(piece, &forward)| BoundaryPiece { piece, forward })
+    }
+}
+
+impl BoundaryPiece<'_> {
     /// +1 where the region lies at smaller r, -1 where it lies at larger r, 0 for a horizontal
     /// piece: the sign of the piece's disc in the area of a cross-section.
     pub(crate) fn disc_sign(&self) -> i32 {
@@ -35,7 +85,9 @@ impl BoundaryPiece {
 
 /// The boundary and where loops cross.
 pub(crate) struct FilledBoundary {
-    pub(crate) pieces: Vec<BoundaryPiece>,
+    pub(crate) pieces: FilledPieces,
+    /// The crossings of the pieces that were filled, where they were of use.
+    pub(super) crossings: Option<CrossingSet>,
     /// A place where two pieces cross, in the region's unit.
     pub(crate) crossing: Option<[f64; 2]>,
     /// How often pieces meet; above [`MOST_MEETINGS`] there are no pieces.
@@ -59,7 +111,7 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The boundary of the set of points whose windings, one for each operand, `inside` accepts.
 /// `operand` tells which operand a piece belongs to.
 pub(crate) fn filled_boundary(
-    pieces: &[Arc<Piece>],
+    pieces: &Arc<Vec<Piece>>,
     inside: &dyn Fn(&[Winding]) -> bool,
     operand: &dyn Fn(usize) -> usize,
     operands: usize,
@@ -68,40 +120,48 @@ pub(crate) fn filled_boundary(
     let meetings = meetings(pieces, coincident);
     if meetings.count > MOST_MEETINGS {
         return FilledBoundary {
-            pieces: Vec::new(),
+            pieces: FilledPieces::new(Vec::new(), Vec::new()),
+            crossings: None,
             crossing: meetings.crossing,
             meetings: meetings.count,
         };
     }
-    let mut parts = Vec::with_capacity(pieces.len());
+    let cut = (!meetings.parameters.is_empty()).then(|| meetings.cut_pieces(pieces));
+    let parts = cut.as_ref().map_or(&pieces[..], |(parts, _)| parts);
     // The piece that each part is of.
-    let mut from: Vec<u32> = Vec::with_capacity(pieces.len());
-    #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
-    for (i, piece) in pieces.iter().enumerate() {
-        let parameters = meetings.parameters.get(&i);
-        cut_at(piece, parameters.map_or(&[], |p| p), &mut parts);
-        from.resize(parts.len(), i as u32);
-    }
-    let owner = |part: usize| operand(from[part] as usize);
-    let set = CrossingSet::new(&parts);
-    let mut kept = Vec::with_capacity(parts.len());
+    let from = |part: usize| cut.as_ref().map_or(part, |(_, from)| from[part] as usize);
+    let owner = |part: usize| operand(from(part));
+    let set = CrossingSet::new(parts);
+    let mut sides = Vec::with_capacity(parts.len());
     // The state on both sides can only change where a piece meets another, so along a loop that
     // meets nothing one ray serves all pieces.
     let mut known: Option<Option<bool>> = None;
     for (i, part) in parts.iter().enumerate() {
-        let tangled = meetings.tangled[from[i] as usize];
-        let carried = known.filter(|_| !tangled && parts[i - 1].end == part.start);
-        let state = carried.or_else(|| side(&set, &parts, &owner, operands, coincident, i, inside));
+        let tangled = meetings.tangled[from(i)];
+        let carried = known.filter(|_| !tangled && parts[i - 1].end() == part.start());
+        let state = carried.or_else(|| side(&set, parts, &owner, operands, coincident, i, inside));
         known = state.filter(|_| !tangled);
-        if let Some(Some(forward)) = state {
-            let mut even = Vec::new();
-            part.clone().even_parts(&mut even);
-            let bounding = |piece| BoundaryPiece { piece, forward };
-            kept.extend(even.into_iter().map(bounding));
-        }
+        sides.push(state.flatten());
     }
+    let whole = cut.is_none() && sides.iter().all(Option::is_some);
+    let boundary = if whole && parts.iter().all(Piece::is_even) {
+        FilledPieces {
+            pieces: pieces.clone(),
+            forward: sides.into_iter().flatten().collect(),
+        }
+    } else {
+        let (mut kept, mut forward) = (Vec::with_capacity(parts.len()), Vec::new());
+        for (part, side) in parts.iter().zip(sides) {
+            if let Some(side) = side {
+                part.even_parts(&mut kept);
+                forward.resize(kept.len(), side);
+            }
+        }
+        FilledPieces::new(kept, forward)
+    };
     FilledBoundary {
-        pieces: kept,
+        pieces: boundary,
+        crossings: cut.is_none().then_some(set),
         crossing: meetings.crossing,
         meetings: meetings.count,
     }
@@ -111,7 +171,7 @@ pub(crate) fn filled_boundary(
 /// `None` where the part is too short for its ray to tell.
 fn side(
     set: &CrossingSet,
-    parts: &[Arc<Piece>],
+    parts: &[Piece],
     owner: &dyn Fn(usize) -> usize,
     operands: usize,
     coincident: f64,
@@ -120,13 +180,13 @@ fn side(
 ) -> Option<Option<bool>> {
     let part = &parts[i];
     let extent = [
-        (part.end[0] - part.start[0]).f64(),
-        (part.end[1] - part.start[1]).f64(),
+        (part.end()[0] - part.start()[0]).f64(),
+        (part.end()[1] - part.start()[1]).f64(),
     ];
     // The ray runs across the part's longer extent.
     let c = usize::from(extent[1].abs() >= extent[0].abs());
     let middle = if part.degree() == 1 {
-        [0, 1].map(|k| (part.start[k] + part.end[k]) * Dd::of(0.5))
+        [0, 1].map(|k| (part.start()[k] + part.end()[k]) * Dd::of(0.5))
     } else {
         part.at(Dd::of(0.5))
     };
@@ -167,7 +227,7 @@ fn side(
 }
 
 /// The parts of a piece between the given parameters.
-fn cut_at(piece: &Arc<Piece>, parameters: &[Dd], parts: &mut Vec<Arc<Piece>>) {
+fn cut_at(piece: &Piece, parameters: &[Dd], parts: &mut Vec<Piece>) {
     if parameters.is_empty() {
         parts.push(piece.clone());
         return;
@@ -175,16 +235,16 @@ fn cut_at(piece: &Arc<Piece>, parameters: &[Dd], parts: &mut Vec<Arc<Piece>>) {
     let mut cuts: Vec<Dd> = parameters.to_vec();
     cuts.sort_by(|a, b| a.partial_cmp(b).expect("parameters are numbers"));
     cuts.dedup_by(|a, b| (*a - *b).abs().f64() < (-60.0_f64).exp2());
-    let mut from = (Dd::ZERO, piece.start);
+    let mut from = (Dd::ZERO, piece.start());
     let ends = cuts.iter().map(|&t| {
         let p = if piece.degree() == 1 {
-            [0, 1].map(|c| piece.start[c] + (piece.end[c] - piece.start[c]) * t)
+            [0, 1].map(|c| piece.start()[c] + (piece.end()[c] - piece.start()[c]) * t)
         } else {
             piece.at(t)
         };
         (t, p)
     });
-    for to in ends.chain([(Dd::ONE, piece.end)]) {
+    for to in ends.chain([(Dd::ONE, piece.end())]) {
         if from.1 != to.1 {
             let mut part = if piece.degree() == 1 {
                 Piece::segment(from.1, to.1, piece.loop_index())
@@ -192,7 +252,7 @@ fn cut_at(piece: &Arc<Piece>, parameters: &[Dd], parts: &mut Vec<Arc<Piece>>) {
                 piece.part(from.0, to.0, from.1, to.1)
             };
             part.on_axis = piece.on_axis;
-            parts.push(Arc::new(part));
+            parts.push(part);
         }
         from = to;
     }
@@ -212,12 +272,25 @@ impl Meetings {
     fn cut(&mut self, piece: usize, at: Dd) {
         self.parameters.entry(piece).or_default().push(at);
     }
+
+    /// The pieces in parts between where they meet, and for each part the number of its piece.
+    fn cut_pieces(&self, pieces: &[Piece]) -> (Vec<Piece>, Vec<u32>) {
+        let mut parts = Vec::with_capacity(pieces.len());
+        let mut from: Vec<u32> = Vec::with_capacity(pieces.len());
+        #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
+        for (i, piece) in pieces.iter().enumerate() {
+            let parameters = self.parameters.get(&i);
+            cut_at(piece, parameters.map_or(&[], |p| p), &mut parts);
+            from.resize(parts.len(), i as u32);
+        }
+        (parts, from)
+    }
 }
 
 /// Where pieces meet other than at ends they share.
-fn meetings(pieces: &[Arc<Piece>], coincident: f64) -> Meetings {
-    let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds().grown(ROUNDING)).collect();
-    let tree = BoxTree::new(&boxes);
+fn meetings(pieces: &[Piece], coincident: f64) -> Meetings {
+    let box_of = |i: usize| pieces[i].bounds().grown(ROUNDING);
+    let tree = BoxTree::over(pieces.len(), |i| box_of(i as usize));
     let mut found = Meetings {
         parameters: HashMap::new(),
         tangled: vec![false; pieces.len()],
@@ -228,15 +301,16 @@ fn meetings(pieces: &[Arc<Piece>], coincident: f64) -> Meetings {
         if found.count > MOST_MEETINGS {
             break;
         }
+        let own = box_of(i);
         tree.visit(
-            |b| b.overlaps(&boxes[i]),
+            |b| b.overlaps(&own),
             |j| {
                 let j = j as usize;
-                if j <= i || !boxes[j].overlaps(&boxes[i]) {
+                if j <= i || !box_of(j).overlaps(&own) {
                     return;
                 }
                 let other = &pieces[j];
-                let neighbours = piece.end == other.start || other.end == piece.start;
+                let neighbours = piece.end() == other.start() || other.end() == piece.start();
                 let tangled = if meet_only_in_corners(piece, other) {
                     !neighbours
                 } else {
@@ -255,8 +329,8 @@ fn meetings(pieces: &[Arc<Piece>], coincident: f64) -> Meetings {
 
 /// Whether the boxes of two bi-monotone pieces touch in no more than a shared end.
 fn meet_only_in_corners(a: &Piece, b: &Piece) -> bool {
-    for p in [a.start, a.end] {
-        for q in [b.start, b.end] {
+    for p in [a.start(), a.end()] {
+        for q in [b.start(), b.end()] {
             if p == q {
                 let (p, ab, bb) = (p.map(Real::f64), &a.bounds(), &b.bounds());
                 // Opposite corners: the boxes lie on the two sides of the point in one coordinate
@@ -286,7 +360,7 @@ impl Part {
     fn whole(piece: &Piece) -> Self {
         Self {
             t: [0.0, 1.0],
-            p: [piece.start.map(Real::f64), piece.end.map(Real::f64)],
+            p: [piece.start().map(Real::f64), piece.end().map(Real::f64)],
         }
     }
     fn bounds(&self) -> Box2 {
@@ -328,7 +402,7 @@ fn meet(
     let mut inner = false;
     let mut tangencies: SmallVec<[[f64; 2]; 4]> = SmallVec::new();
     for (x, y, k) in [(a, b, j), (b, a, i)] {
-        for (s, end) in [(0.0, x.start), (1.0, x.end)] {
+        for (s, end) in [(0.0, x.start()), (1.0, x.end())] {
             if let Some(t) = parameter_on(y, end, coincident) {
                 contacts += 1;
                 if are_along(x.twin().slope(s), y.twin().slope(t.f64())) {
@@ -351,7 +425,7 @@ fn meet(
         };
         found.cut(i, s);
         found.cut(j, t);
-        let p = [0, 1].map(|c| (a.start[c] + s * (a.end[c] - a.start[c])).f64());
+        let p = [0, 1].map(|c| (a.start()[c] + s * (a.end()[c] - a.start()[c])).f64());
         found.crossing.get_or_insert(p);
         return true;
     }
@@ -363,28 +437,28 @@ fn parameter_on(piece: &Piece, p: [Dd; 2], coincident: f64) -> Option<Dd> {
     let close = |q: [Dd; 2]| {
         (q[0] - p[0]).f64().abs() <= coincident && (q[1] - p[1]).f64().abs() <= coincident
     };
-    if close(piece.start) {
+    if close(piece.start()) {
         return Some(Dd::ZERO);
     }
-    if close(piece.end) {
+    if close(piece.end()) {
         return Some(Dd::ONE);
     }
     let extent = [
-        (piece.end[0] - piece.start[0]).f64().abs(),
-        (piece.end[1] - piece.start[1]).f64().abs(),
+        (piece.end()[0] - piece.start()[0]).f64().abs(),
+        (piece.end()[1] - piece.start()[1]).f64().abs(),
     ];
     let c = usize::from(extent[1] >= extent[0]);
-    let (low, high) = if piece.start[c] <= piece.end[c] {
-        (piece.start[c], piece.end[c])
+    let (low, high) = if piece.start()[c] <= piece.end()[c] {
+        (piece.start()[c], piece.end()[c])
     } else {
-        (piece.end[c], piece.start[c])
+        (piece.end()[c], piece.start()[c])
     };
     if !(p[c] > low && p[c] < high) {
         return None;
     }
     // Along the longer extent the slope is at most about 1, so the offset is a distance.
     let t = if piece.degree() == 1 {
-        (p[c] - piece.start[c]) / (piece.end[c] - piece.start[c])
+        (p[c] - piece.start()[c]) / (piece.end()[c] - piece.start()[c])
     } else {
         piece.parameter_at(c, p[c])
     };
@@ -409,11 +483,11 @@ fn coincide(a: &Piece, b: &Piece, coincident: f64) -> bool {
 /// Parameters of a proper crossing of two segments.
 fn segments_cross(a: &Piece, b: &Piece) -> Option<(Dd, Dd)> {
     let side = |p: &Piece, q: [Dd; 2]| {
-        let d = [p.end[0] - p.start[0], p.end[1] - p.start[1]];
-        (q[1] - p.start[1]) * d[0] - (q[0] - p.start[0]) * d[1]
+        let d = [p.end()[0] - p.start()[0], p.end()[1] - p.start()[1]];
+        (q[1] - p.start()[1]) * d[0] - (q[0] - p.start()[0]) * d[1]
     };
-    let (b0, b1) = (side(a, b.start), side(a, b.end));
-    let (a0, a1) = (side(b, a.start), side(b, a.end));
+    let (b0, b1) = (side(a, b.start()), side(a, b.end()));
+    let (a0, a1) = (side(b, a.start()), side(b, a.end()));
     let apart = |u: Dd, v: Dd| u.f64() * v.f64() < 0.0;
     (apart(a0, a1) && apart(b0, b1)).then(|| (a0 / (a0 - a1), b0 / (b0 - b1)))
 }

@@ -592,7 +592,7 @@ pub(in crate::region) mod tests {
         for (name, region) in regions() {
             for voxels in [40.0, 300.0, 900.0] {
                 let swept = swept(&region);
-                let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
+                let exact = DistanceSet::new(swept.iter().map(|b| b.piece));
                 let extent = extent_of(&swept, voxels);
                 let step = extent.cell;
                 let (arcs, cells) = (1.5e-5 * step, 4.5e-5 * step);

@@ -13,7 +13,6 @@ use super::tree::{Box2, BoxTree};
 use crate::math::tolerance::ON_BOUNDARY;
 use crate::math::{Dd, Real};
 use std::cmp::Ordering;
-use std::sync::Arc;
 
 /// Signed and plain count of crossings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -47,10 +46,9 @@ pub(crate) struct CrossingSet {
 }
 
 impl CrossingSet {
-    pub(crate) fn new(pieces: &[Arc<Piece>]) -> Self {
-        let boxes: Vec<Box2> = pieces.iter().map(|p| p.bounds()).collect();
+    pub(crate) fn new(pieces: &[Piece]) -> Self {
         Self {
-            tree: BoxTree::new(&boxes),
+            tree: BoxTree::over(pieces.len(), |i| pieces[i as usize].bounds()),
         }
     }
 
@@ -59,7 +57,7 @@ impl CrossingSet {
     }
 
     /// Crossings by f64 alone, `None` where the rounding does not decide.
-    pub(crate) fn count(&self, pieces: &[Arc<Piece>], p: MeridianPoint) -> Option<Winding> {
+    pub(crate) fn count(&self, pieces: &[Piece], p: MeridianPoint) -> Option<Winding> {
         let mut winding = Winding::default();
         let mut decided = true;
         // Boxes are rounded to nearest; one ulp of the unit square covers that.
@@ -78,13 +76,13 @@ impl CrossingSet {
             if piece.is_horizontal() {
                 // Never crossed; but the point may lie on it.
                 decided = !(within
-                    && compare(p.z, p.z_error, piece.start[1]).is_none_or(Ordering::is_eq));
+                    && compare(p.z, p.z_error, piece.start()[1]).is_none_or(Ordering::is_eq));
                 return;
             }
             let (low, high) = if piece.direction() > 0 {
-                (piece.start, piece.end)
+                (piece.start(), piece.end())
             } else {
-                (piece.end, piece.start)
+                (piece.end(), piece.start())
             };
             let (Some(above_low), Some(above_high)) = (
                 compare(p.z, p.z_error, low[1]),
@@ -125,7 +123,7 @@ impl CrossingSet {
 
     /// Crossings in double-double, and whether any piece passes through the point. Such pieces count
     /// as passed, all alike, so that a path there and back changes nothing.
-    pub(crate) fn count_exact(&self, pieces: &[Arc<Piece>], r: Dd, z: Dd) -> (Winding, bool) {
+    pub(crate) fn count_exact(&self, pieces: &[Piece], r: Dd, z: Dd) -> (Winding, bool) {
         let mut winding = Winding::default();
         let mut on = false;
         let margin = 4.0 * f64::EPSILON;
@@ -139,19 +137,19 @@ impl CrossingSet {
             if piece.on_axis {
                 return;
             }
-            on |= [piece.start, piece.end]
+            on |= [piece.start(), piece.end()]
                 .iter()
                 .any(|v| close(v[0], r) && close(v[1], z));
             if piece.is_horizontal() {
-                let (a, b) = (piece.start[0], piece.end[0]);
-                on |= close(piece.start[1], z)
+                let (a, b) = (piece.start()[0], piece.end()[0]);
+                on |= close(piece.start()[1], z)
                     && (r - a).f64().signum() * (r - b).f64().signum() <= 0.0;
                 return;
             }
             let (low, high) = if piece.direction() > 0 {
-                (piece.start, piece.end)
+                (piece.start(), piece.end())
             } else {
-                (piece.end, piece.start)
+                (piece.end(), piece.start())
             };
             if z < low[1] || z > high[1] {
                 return;
@@ -169,7 +167,7 @@ impl CrossingSet {
     /// leaving out piece `skip` and those within `coincident` of `from`, which are returned apart.
     pub(crate) fn count_beyond(
         &self,
-        pieces: &[Arc<Piece>],
+        pieces: &[Piece],
         c: usize,
         v: Dd,
         from: Dd,
@@ -183,16 +181,16 @@ impl CrossingSet {
             |b| vf >= b.min[c] - margin && vf <= b.max[c] + margin && b.max[1 - c] >= limit,
             |i| {
                 let piece = &pieces[i as usize];
-                let (low, high) = if piece.start[c] <= piece.end[c] {
-                    (piece.start[c], piece.end[c])
+                let (low, high) = if piece.start()[c] <= piece.end()[c] {
+                    (piece.start()[c], piece.end()[c])
                 } else {
-                    (piece.end[c], piece.start[c])
+                    (piece.end()[c], piece.start()[c])
                 };
                 if !(v >= low && v < high) {
                     return;
                 }
                 let offset = (piece.other_at(c, v) - from).f64();
-                let direction = sign(piece.end[c].partial_cmp(&piece.start[c]));
+                let direction = sign(piece.end()[c].partial_cmp(&piece.start()[c]));
                 if offset.abs() <= coincident {
                     each(i as usize, true, direction);
                 } else if offset > 0.0 {

@@ -166,8 +166,8 @@ fn parts(piece: &Piece) -> impl Iterator<Item = Cow<'_, Piece>> {
     let parts = if piece.is_rational() { PARTS } else { 1 };
     let cut = move |i: u32| Dd::of(f64::from(i)) / Dd::of(f64::from(parts));
     let point = move |k: u32| match k {
-        0 => piece.start,
-        k if k == parts => piece.end,
+        0 => piece.start(),
+        k if k == parts => piece.end(),
         k => piece.at(cut(k)),
     };
     (0..parts).filter_map(move |i| {
@@ -186,11 +186,11 @@ fn parts(piece: &Piece) -> impl Iterator<Item = Cow<'_, Piece>> {
 impl Arc {
     fn new(piece: &Piece) -> Self {
         let half = Dd::of(0.5);
-        let middle = [0, 1].map(|c| ((piece.start[c] + piece.end[c]) * half).f64());
+        let middle = [0, 1].map(|c| ((piece.start()[c] + piece.end()[c]) * half).f64());
         let relative = |p: [Dd; 2]| [0, 1].map(|c| (p[c] - Dd::of(middle[c])).f64());
-        let ends = [relative(piece.start), relative(piece.end)];
+        let ends = [relative(piece.start()), relative(piece.end())];
         let shape = if piece.degree() == 1 {
-            let direction = [0, 1].map(|c| (piece.end[c] - piece.start[c]).f64());
+            let direction = [0, 1].map(|c| (piece.end()[c] - piece.start()[c]).f64());
             Shape::Segment {
                 direction,
                 length_squared: direction[0] * direction[0] + direction[1] * direction[1],

@@ -21,7 +21,7 @@ pub(crate) fn is_mirrored(boundary: &[BoundaryPiece], middle: f64, tolerance: f6
     if boundary.len() > MOST_PIECES {
         return false;
     }
-    let points: Vec<_> = boundary.iter().map(|b| points(&b.piece)).collect();
+    let points: Vec<_> = boundary.iter().map(|b| points(b.piece)).collect();
     are_paired(&points, middle, tolerance)
 }
 
@@ -69,7 +69,8 @@ mod tests {
             heights().fold(f64::MAX, f64::min),
             heights().fold(f64::MIN, f64::max),
         );
-        is_mirrored(body.boundary(), 0.5 * (low + high) + away, tolerance)
+        let boundary: Vec<_> = body.boundary().iter().collect();
+        is_mirrored(&boundary, 0.5 * (low + high) + away, tolerance)
     }
 
     #[test]

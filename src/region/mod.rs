@@ -47,7 +47,7 @@ pub use error::RegionError;
 pub use interpolate::Ends;
 pub use profile::{Across, Boundary, Fill, MAX_GAP, ProfileLoop, Region, Rules};
 
-pub(crate) use boundary::{BoundaryPiece, MOST_MEETINGS, SAME_FACE, filled_boundary};
+pub(crate) use boundary::{BoundaryPiece, FilledPieces, MOST_MEETINGS, SAME_FACE, filled_boundary};
 pub(crate) use cells::{CellTable, LEVEL_BITS, LOST_BITS, PARTS, TILE};
 pub(crate) use chain::Chain;
 pub(crate) use crossings::MeridianPoint;

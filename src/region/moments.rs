@@ -16,7 +16,7 @@
 //!   pieces were cut at meetings known to f64 only.
 //! * Source: Green's theorem; the quadrature is [`gauss`].
 
-use super::boundary::{BoundaryPiece, SAME_FACE, SAME_PROFILE};
+use super::boundary::{FilledPieces, SAME_FACE, SAME_PROFILE};
 use super::piece::Piece;
 use crate::math::bernstein::{self, Coefficients};
 use crate::math::gauss::{self, Integrals};
@@ -75,7 +75,7 @@ const MOST_PANELS: usize = 800;
 
 impl SectionMoments {
     /// The moments of the region that the pieces bound.
-    pub(crate) fn new(boundary: &[BoundaryPiece]) -> Self {
+    pub(crate) fn new(boundary: &FilledPieces) -> Self {
         let frame = Frame::around(boundary);
         let closing = Closing::new(boundary);
         let mut tolerance = TOLERANCE.max(frame.least_tolerance());
@@ -126,7 +126,7 @@ struct Frame {
 }
 
 impl Frame {
-    fn around(boundary: &[BoundaryPiece]) -> Self {
+    fn around(boundary: &FilledPieces) -> Self {
         let mut min = [f64::INFINITY; 2];
         let mut max = [f64::NEG_INFINITY; 2];
         for b in boundary.iter().map(|b| b.piece.bounds()) {
@@ -160,7 +160,7 @@ impl Frame {
 
     fn moments(
         &self,
-        boundary: &[BoundaryPiece],
+        boundary: &FilledPieces,
         closing: &Closing,
         tolerance: f64,
     ) -> SectionMoments {
@@ -173,8 +173,8 @@ impl Frame {
         };
         // Lengths along r and along z of all pieces, in half sides.
         let mut variation = 0.0;
-        for part in boundary {
-            let one = self.along(&part.piece, &tolerances);
+        for part in boundary.iter() {
+            let one = self.along(part.piece, &tolerances);
             for i in 0..INTEGRALS {
                 // S counts parts of either direction.
                 let turned = !part.forward && i + 1 < INTEGRALS;
@@ -226,7 +226,7 @@ impl Frame {
     fn along(&self, piece: &Piece, tolerances: &[f64; INTEGRALS]) -> Integrals<INTEGRALS> {
         let mut found = if piece.degree() == 1 {
             Integrals {
-                values: self.along_segment(piece.start, piece.end),
+                values: self.along_segment(piece.start(), piece.end()),
                 errors: [0.0; INTEGRALS],
             }
         } else {
@@ -340,7 +340,7 @@ struct Closing {
 }
 
 impl Closing {
-    fn new(boundary: &[BoundaryPiece]) -> Self {
+    fn new(boundary: &FilledPieces) -> Self {
         let (mut ends, mut starts) = loose(boundary);
         let mut closing = Self {
             segments: Vec::new(),
@@ -371,16 +371,16 @@ impl Closing {
 }
 
 /// Ends that no piece starts from and starts that no piece ends at, ascending in r and z.
-fn loose(boundary: &[BoundaryPiece]) -> (Vec<[Dd; 2]>, Vec<[Dd; 2]>) {
+fn loose(boundary: &FilledPieces) -> (Vec<[Dd; 2]>, Vec<[Dd; 2]>) {
     // By numbers: there may be very many ends, and as a rule none of them is loose.
     #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
     let mut order: Vec<u32> = (0..2 * boundary.len() as u32).collect();
     let end = |i: u32| {
-        let part = &boundary[i as usize / 2];
+        let part = boundary.at(i as usize / 2);
         let (point, sign) = if i.is_multiple_of(2) {
-            (part.piece.start, 1)
+            (part.piece.start(), 1)
         } else {
-            (part.piece.end, -1)
+            (part.piece.end(), -1)
         };
         (point, if part.forward { sign } else { -sign })
     };

@@ -17,7 +17,6 @@ use crate::math::tolerance::{ON_BOUNDARY, gamma};
 use crate::math::{Dd, Real};
 use std::cmp::Ordering;
 use std::ops::Deref;
-use std::sync::Arc;
 
 /// Where a point lies relative to a piece, looking along +r at the point's height.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,17 +33,26 @@ pub(crate) enum Position {
 pub(crate) const TABLE: usize = 16;
 
 /// A part of a curve on which r and z are both monotone.
+///
+/// A profile may have very many straight pieces between points that are f64s: they take no more than these.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
-    pub(crate) start: [Dd; 2],
-    pub(crate) end: [Dd; 2],
-    /// What a piece that is not straight has besides. A profile may have very many straight ones.
-    curve: Option<Box<Curve>>,
-    /// Bound on the rounding of a coordinate that the f64 twin evaluates.
-    error: f64,
+    /// Start and end, each rounded to f64.
+    ends: [[f64; 2]; 2],
+    /// What else there is.
+    rest: Option<Box<Rest>>,
     loop_index: u32,
     /// On r = 0, where nothing is swept.
     pub(crate) on_axis: bool,
+}
+
+/// What a piece has besides f64s of its ends.
+#[derive(Debug, Clone)]
+struct Rest {
+    start: [Dd; 2],
+    end: [Dd; 2],
+    /// `None` of a straight piece.
+    curve: Option<Curve>,
 }
 
 /// What makes a piece curved.
@@ -58,6 +66,8 @@ struct Curve {
     origin: [f64; 2],
     /// Coefficients of w (r - origin), w (z - origin) and w.
     coefficients: [Coefficients<f64>; 3],
+    /// Bound on the rounding of a coordinate that they give.
+    error: f64,
     /// Points at the parameters i / [`TABLE`], relative to the origin; empty until they are asked for.
     table: Vec<[f64; 2]>,
 }
@@ -114,17 +124,17 @@ impl Piece {
         let origin = start.map(Real::f64);
         let coefficients = relative(&points, origin);
         let error = rounding(&coefficients);
-        Self {
-            start,
-            end,
-            curve: Some(Box::new(Curve {
-                points,
-                circle,
-                origin,
-                coefficients,
-                table: Vec::new(),
-            })),
+        let curve = Some(Curve {
+            points,
+            circle,
+            origin,
+            coefficients,
             error,
+            table: Vec::new(),
+        });
+        Self {
+            ends: [start, end].map(|p| p.map(Real::f64)),
+            rest: Some(Box::new(Rest { start, end, curve })),
             loop_index: numbered(loop_index),
             on_axis,
         }
@@ -132,26 +142,49 @@ impl Piece {
 
     /// A straight piece.
     pub(crate) fn segment(start: [Dd; 2], end: [Dd; 2], loop_index: usize) -> Self {
-        let mut segment = Self {
+        let rounded = start.iter().chain(&end).any(|v| v.lo() != 0.0);
+        let rest = Rest {
             start,
             end,
             curve: None,
-            error: 0.0,
+        };
+        Self {
+            ends: [start, end].map(|p| p.map(Real::f64)),
+            rest: rounded.then(|| Box::new(rest)),
             loop_index: numbered(loop_index),
             on_axis: start[0] == Dd::ZERO && end[0] == Dd::ZERO,
-        };
-        let twin = segment.twin();
-        segment.error = rounding(&twin.rows());
-        segment
+        }
+    }
+
+    /// The point it starts at.
+    #[inline]
+    pub(crate) fn start(&self) -> [Dd; 2] {
+        match &self.rest {
+            None => self.ends[0].map(Dd::of),
+            Some(rest) => rest.start,
+        }
+    }
+
+    /// The point it ends at.
+    #[inline]
+    pub(crate) fn end(&self) -> [Dd; 2] {
+        match &self.rest {
+            None => self.ends[1].map(Dd::of),
+            Some(rest) => rest.end,
+        }
+    }
+
+    fn curve(&self) -> Option<&Curve> {
+        self.rest.as_ref().and_then(|rest| rest.curve.as_ref())
     }
 
     pub(crate) fn degree(&self) -> usize {
-        self.curve.as_ref().map_or(1, |c| c.points.len() - 1)
+        self.curve().map_or(1, |c| c.points.len() - 1)
     }
 
     /// Whether it is neither straight nor circular: nothing of it has a closed form.
     pub(crate) fn is_rational(&self) -> bool {
-        self.curve.as_ref().is_some_and(|c| c.circle.is_none())
+        self.curve().is_some_and(|c| c.circle.is_none())
     }
 
     /// Number of the loop it is of.
@@ -161,21 +194,21 @@ impl Piece {
 
     /// Centre and radius of a circular piece.
     pub(crate) fn circle(&self) -> Option<([Dd; 2], Dd)> {
-        self.curve.as_ref().and_then(|c| c.circle)
+        self.curve().and_then(|c| c.circle)
     }
 
     /// The box of its ends, which hold all of it.
     #[inline]
     pub(crate) fn bounds(&self) -> Box2 {
-        Box2::around(self.start.map(Real::f64), self.end.map(Real::f64))
+        Box2::around(self.ends[0], self.ends[1])
     }
 
     /// A homogeneous control point.
     pub(crate) fn point(&self, i: usize) -> HomogeneousPoint {
-        match &self.curve {
+        match self.curve() {
             Some(curve) => curve.points[i],
             None => {
-                let [r, z] = if i == 0 { self.start } else { self.end };
+                let [r, z] = if i == 0 { self.start() } else { self.end() };
                 [r, z, Dd::ONE]
             }
         }
@@ -189,28 +222,32 @@ impl Piece {
     /// Its f64 side.
     #[inline]
     pub(crate) fn twin(&self) -> Twin<'_> {
-        let (origin, shape) = match &self.curve {
-            Some(curve) => (curve.origin, Shape::Curved(curve)),
-            None => {
-                let origin = self.start.map(Real::f64);
-                let from = |p: [Dd; 2], c: usize| (p[c] - Dd::of(origin[c])).f64();
-                let rows = [0, 1].map(|c| [from(self.start, c), from(self.end, c)]);
-                (origin, Shape::Straight(rows))
-            }
-        };
-        Twin {
-            origin,
-            error: self.error,
-            shape,
+        if let Some(curve) = self.curve() {
+            return Twin {
+                origin: curve.origin,
+                error: curve.error,
+                shape: Shape::Curved(curve),
+            };
         }
+        let (origin, start, end) = (self.ends[0], self.start(), self.end());
+        let from = |p: [Dd; 2], c: usize| (p[c] - Dd::of(origin[c])).f64();
+        let shape = Shape::Straight([0, 1].map(|c| [from(start, c), from(end, c)]));
+        let mut twin = Twin {
+            origin,
+            error: 0.0,
+            shape,
+        };
+        twin.error = rounding(&twin.rows());
+        twin
     }
 
     /// Moves its ends by a rounding.
     pub(crate) fn with_ends(mut self, start: [Dd; 2], end: [Dd; 2]) -> Self {
-        if self.curve.is_none() {
-            return Self::segment(start, end, self.loop_index());
+        match &mut self.rest {
+            Some(rest) if rest.curve.is_some() => (rest.start, rest.end) = (start, end),
+            _ => return Self::segment(start, end, self.loop_index()),
         }
-        (self.start, self.end) = (start, end);
+        self.ends = [start, end].map(|p| p.map(Real::f64));
         self
     }
 
@@ -219,7 +256,7 @@ impl Piece {
         &mut self,
         of: impl FnOnce(usize, &[Coefficients<f64>; 3]) -> Option<Vec<[f64; 2]>>,
     ) {
-        if let Some(curve) = &mut self.curve
+        if let Some(curve) = self.rest.as_mut().and_then(|rest| rest.curve.as_mut())
             && let Some(table) = of(curve.points.len() - 1, &curve.coefficients)
         {
             curve.table = table;
@@ -228,12 +265,12 @@ impl Piece {
 
     /// Whether z does not change along the piece.
     pub(crate) fn is_horizontal(&self) -> bool {
-        self.start[1] == self.end[1]
+        self.start()[1] == self.end()[1]
     }
 
     /// +1 where z rises from start to end, -1 where it falls, 0 for a horizontal piece.
     pub(crate) fn direction(&self) -> i32 {
-        sign(self.end[1].partial_cmp(&self.start[1]))
+        sign(self.end()[1].partial_cmp(&self.start()[1]))
     }
 
     /// The coefficients of one homogeneous coordinate.
@@ -261,10 +298,10 @@ impl Piece {
     /// The parameter at which coordinate `c` (0 is r, 1 is z) takes the value `v`, which must lie
     /// within the piece's range of it.
     pub(crate) fn parameter_at(&self, c: usize, v: Dd) -> Dd {
-        if v == self.start[c] {
+        if v == self.start()[c] {
             return Dd::ZERO;
         }
-        if v == self.end[c] {
+        if v == self.end()[c] {
             return Dd::ONE;
         }
         let f: Coefficients<Dd> = self.points().map(|p| p[c] - v * p[2]).collect();
@@ -275,7 +312,7 @@ impl Piece {
     fn rough_parameter(&self, c: usize, v: f64) -> f64 {
         let twin = self.twin();
         let v = v - twin.origin[c];
-        let rising = self.end[c] > self.start[c];
+        let rising = self.end()[c] > self.start()[c];
         let (mut lo, mut hi) = (0.0, 1.0);
         for _ in 0..26 {
             let t = 0.5 * (lo + hi);
@@ -292,15 +329,15 @@ impl Piece {
     pub(crate) fn other_at(&self, c: usize, v: Dd) -> Dd {
         if self.degree() == 1 {
             // Straight, whatever the weights.
-            let (a, b) = (self.start, self.end);
+            let (a, b) = (self.start(), self.end());
             let s = (v - a[c]) / (b[c] - a[c]);
             return a[1 - c] + (b[1 - c] - a[1 - c]) * s;
         }
-        if v == self.start[c] {
-            return self.start[1 - c];
+        if v == self.start()[c] {
+            return self.start()[1 - c];
         }
-        if v == self.end[c] {
-            return self.end[1 - c];
+        if v == self.end()[c] {
+            return self.end()[1 - c];
         }
         self.at(self.parameter_at(c, v))[1 - c]
     }
@@ -311,7 +348,7 @@ impl Piece {
         let t = self.twin();
         let q = (v - Dd::of(t.origin[c])).f64();
         let error = t.error + 4.0 * f64::EPSILON * q.abs();
-        let rising = if self.end[c] > self.start[c] {
+        let rising = if self.end()[c] > self.start()[c] {
             1.0
         } else {
             -1.0
@@ -406,12 +443,12 @@ impl Piece {
             }
         };
         let end = [
-            (self.end[0] - Dd::of(t.origin[0])).f64(),
-            (self.end[1] - Dd::of(t.origin[1])).f64(),
+            (self.end()[0] - Dd::of(t.origin[0])).f64(),
+            (self.end()[1] - Dd::of(t.origin[1])).f64(),
         ];
         let start = [
-            (self.start[0] - Dd::of(t.origin[0])).f64(),
-            (self.start[1] - Dd::of(t.origin[1])).f64(),
+            (self.start()[0] - Dd::of(t.origin[0])).f64(),
+            (self.start()[1] - Dd::of(t.origin[1])).f64(),
         ];
         if self.degree() == 1 {
             let (dr, dz) = (end[0] - start[0], end[1] - start[1]);
@@ -485,8 +522,8 @@ impl Piece {
         let circle = self.circle().map(|(c, r)| (point(c), r * k));
         let mut mapped = Self::new(
             points,
-            point(self.start),
-            point(self.end),
+            point(self.start()),
+            point(self.end()),
             self.loop_index(),
             circle,
         );
@@ -499,29 +536,36 @@ impl Piece {
     /// The piece in parts whose weights differ by no more than [`SKEW`], cut in the middle of the
     /// longer extent. A heavy weight crowds most of a piece into parameters next to an end, where
     /// f64 cannot tell them apart; in each part's own parameter it can.
-    pub(crate) fn even_parts(self: Arc<Self>, parts: &mut Vec<Arc<Self>>) {
+    pub(crate) fn even_parts(&self, parts: &mut Vec<Self>) {
+        let Some((t, at)) = self.uneven() else {
+            parts.push(self.clone());
+            return;
+        };
+        self.part(Dd::ZERO, t, self.start(), at).even_parts(parts);
+        self.part(t, Dd::ONE, at, self.end()).even_parts(parts);
+    }
+
+    /// Whether it is the only one of its [`even_parts`](Self::even_parts).
+    pub(crate) fn is_even(&self) -> bool {
+        self.uneven().is_none()
+    }
+
+    /// Where it is to be cut: the parameter and the point.
+    fn uneven(&self) -> Option<(Dd, [Dd; 2])> {
+        if self.degree() == 1 {
+            return None;
+        }
         let weights = self.points().map(|p| p[2].f64());
         let (low, high) = weights.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
-        let extent = [0, 1].map(|c| (self.end[c] - self.start[c]).f64().abs());
+        let (start, end) = (self.start(), self.end());
+        let extent = [0, 1].map(|c| (end[c] - start[c]).f64().abs());
         let c = usize::from(extent[1] >= extent[0]);
-        if self.degree() == 1 || high <= SKEW * low || extent[c] < f64::EPSILON {
-            parts.push(self);
-            return;
+        if high <= SKEW * low || extent[c] < f64::EPSILON {
+            return None;
         }
-        let middle = (self.start[c] + self.end[c]) * Dd::of(0.5);
+        let middle = (start[c] + end[c]) * Dd::of(0.5);
         let t = self.parameter_at(c, middle);
-        if !(t > Dd::ZERO && t < Dd::ONE) {
-            parts.push(self);
-            return;
-        }
-        let at = self.at(t);
-        let halves = [
-            self.part(Dd::ZERO, t, self.start, at),
-            self.part(t, Dd::ONE, at, self.end),
-        ];
-        for half in halves {
-            Arc::new(half).even_parts(parts);
-        }
+        (t > Dd::ZERO && t < Dd::ONE).then(|| (t, self.at(t)))
     }
 }
 
@@ -720,7 +764,7 @@ mod tests {
             let region = Region::new(&[vec![curve]], boundary, Fill::EvenOdd).expect("a region");
             let (mut widest, mut missing, mut all) = (0.0_f64, 0, 0);
             for piece in region.section().pieces().iter().filter(|p| p.degree() > 1) {
-                let (a, b) = (piece.start[1], piece.end[1]);
+                let (a, b) = (piece.start()[1], piece.end()[1]);
                 for i in 1..400_u32 {
                     // Crowded towards both ends, where the pieces turn.
                     let x = f64::from(i) / 400.0;

@@ -551,7 +551,7 @@ mod tests {
                 (900.0, [7.2, 2.3]),
             ] {
                 let swept = swept(&region);
-                let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
+                let exact = DistanceSet::new(swept.iter().map(|b| b.piece));
                 let extent = extent_of(&swept, voxels);
                 let step = extent.cell;
                 let chain = Chain::new(&swept, 1.5e-5 * step, 100_000, true).expect("few arcs");

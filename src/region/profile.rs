@@ -4,7 +4,7 @@
 //! laid on it, and everything scaled by a power of two into the unit square, so that a scene and
 //! the same scene times 2^20 take the same branches to the last bit.
 
-use super::boundary::{self, BoundaryPiece, FilledBoundary};
+use super::boundary::{self, FilledBoundary, FilledPieces};
 use super::crossings::Winding;
 use super::curve::{self, Bezier, ProfileCurve};
 use super::error::RegionError;
@@ -16,7 +16,7 @@ use crate::math::bernstein::Coefficients;
 use crate::math::tolerance::{BELOW_AXIS, GAP};
 use crate::math::{Dd, Real};
 use crate::nurbs::{self, BasisCache, KnotVector};
-use std::borrow::Cow;
+use smallvec::{SmallVec, smallvec};
 use std::sync::{Arc, OnceLock};
 
 /// Curves in order, head to tail.
@@ -109,70 +109,139 @@ pub struct Region {
 /// apart by.
 const THIN: f64 = 1024.0 * boundary::SAME_PROFILE;
 
-/// A loop of pieces in scene units, before scaling.
-struct Chain {
-    pieces: Vec<Link>,
+/// A loop of curves, scaled into the unit square once [`into_unit`] has seen it.
+struct Chain<'a> {
+    runs: Vec<Run<'a>>,
+}
+
+/// What a curve is cut into first.
+enum Run<'a> {
+    /// A polyline, whose segments are made whenever they are looked at: a profile may have very many.
+    Polyline {
+        points: &'a [[f64; 2]],
+        /// Whether it runs backwards.
+        back: bool,
+        /// What coordinates are multiplied by, a power of two each but for its sign.
+        scale: [f64; 2],
+        curve: usize,
+    },
+    Curved(Box<Curved>),
+}
+
+/// A Bézier piece of a curve.
+struct Curved {
+    link: Link,
+    /// Parameters and points where it is cut, its ends included; empty until it is.
+    cuts: Vec<CutPoint>,
 }
 
 /// One piece of a loop.
 struct Link {
-    shape: Shape,
+    bezier: Bezier,
     /// Which curve of the loop it is of.
     curve: usize,
     /// Whether the curve may jump where the piece ends.
     breaks: bool,
 }
 
-/// A profile may have very many segments, so they take no more than their numbers.
-enum Shape {
-    /// Part of a polyline, between the points of those numbers.
-    Segment {
-        ends: [[f64; 2]; 2],
-        numbers: [u32; 2],
-    },
-    Curved(Box<Bezier>),
+/// The ends of a polyline's segment.
+#[derive(Clone, Copy)]
+struct Segment {
+    ends: [[f64; 2]; 2],
+    /// The numbers of the points.
+    numbers: [u32; 2],
 }
 
-impl Link {
-    fn bezier(&self) -> Cow<'_, Bezier> {
-        match &self.shape {
-            Shape::Segment {
-                ends: [a, b],
-                numbers,
-            } => Cow::Owned(Bezier::segment(
-                a.map(Dd::of),
-                b.map(Dd::of),
-                numbers.map(f64::from),
-            )),
-            Shape::Curved(bezier) => Cow::Borrowed(bezier),
-        }
+impl Segment {
+    fn bezier(&self) -> Bezier {
+        let [a, b] = self.ends.map(|p| p.map(Dd::of));
+        Bezier::segment(a, b, self.numbers.map(f64::from))
     }
 }
 
-impl Chain {
+impl Run<'_> {
+    /// How many pieces it has.
+    fn len(&self) -> usize {
+        match self {
+            Self::Polyline { points, .. } => points.len() - 1,
+            Self::Curved(_) => 1,
+        }
+    }
+
+    /// The segment of that number along a polyline.
+    fn segment(points: &[[f64; 2]], back: bool, scale: [f64; 2], k: usize) -> Segment {
+        let i = if back { points.len() - 2 - k } else { k };
+        let point = |p: [f64; 2]| [p[0] * scale[0], p[1] * scale[1]];
+        #[allow(clippy::cast_possible_truncation, reason = "points are counted in u32")]
+        let (mut ends, mut numbers) = (
+            [points[i], points[i + 1]].map(point),
+            [i as u32, i as u32 + 1],
+        );
+        if back {
+            ends.reverse();
+            numbers.reverse();
+        }
+        Segment { ends, numbers }
+    }
+
+    /// Its pieces with their cuts, in order.
+    fn cuts(&self) -> impl Iterator<Item = Cut<'_>> {
+        (0..self.len()).map(|k| match self {
+            &Self::Polyline {
+                points,
+                back,
+                scale,
+                curve,
+            } => Cut {
+                of: Of::Segment(Self::segment(points, back, scale, k)),
+                curve,
+                breaks: false,
+            },
+            Self::Curved(curved) => Cut {
+                of: Of::Curved(curved),
+                curve: curved.link.curve,
+                breaks: curved.link.breaks,
+            },
+        })
+    }
+}
+
+impl<'a> Chain<'a> {
+    /// Its pieces with their cuts, in order.
+    fn cuts(&self) -> impl Iterator<Item = Cut<'_>> {
+        self.runs.iter().flat_map(Run::cuts)
+    }
+
     /// Its image on the other side of the axis.
     fn mirrored(&self) -> Self {
-        let mirrored = |link: &Link| {
-            let shape = match &link.shape {
-                &Shape::Segment { ends, numbers } => Shape::Segment {
-                    ends: ends.map(|[r, z]| [-r, z]),
-                    numbers,
-                },
-                Shape::Curved(bezier) => {
-                    let mut bezier = bezier.clone();
-                    for point in &mut bezier.points {
-                        point[0] = -point[0];
-                    }
-                    if let Some((centre, _)) = &mut bezier.circle {
-                        centre[0] = -centre[0];
-                    }
-                    Shape::Curved(bezier)
+        let mirrored = |run: &Run<'a>| match run {
+            &Run::Polyline {
+                points,
+                back,
+                scale: [r, z],
+                curve,
+            } => Run::Polyline {
+                points,
+                back,
+                scale: [-r, z],
+                curve,
+            },
+            Run::Curved(curved) => {
+                let link = &curved.link;
+                let mut bezier = link.bezier.clone();
+                for point in &mut bezier.points {
+                    point[0] = -point[0];
                 }
-            };
-            Link { shape, ..*link }
+                if let Some((centre, _)) = &mut bezier.circle {
+                    centre[0] = -centre[0];
+                }
+                let cuts = piece::cuts(&bezier);
+                let link = Link { bezier, ..*link };
+                Run::Curved(Box::new(Curved { link, cuts }))
+            }
         };
-        Self {
-            pieces: self.pieces.iter().map(mirrored).collect(),
+        Chain {
+            runs: self.runs.iter().map(mirrored).collect(),
         }
     }
 }
@@ -185,26 +254,24 @@ struct Outline {
 
 impl Outline {
     /// What the fill rule makes of pieces.
-    fn of(pieces: Vec<Arc<Piece>>, fill: Fill) -> Result<Self, RegionError> {
+    fn of(pieces: Vec<Piece>, fill: Fill) -> Result<Self, RegionError> {
+        let pieces = Arc::new(pieces);
         let found = filled(&pieces, &|w| fill.is_inside(w[0]), &|_| 0, 1)?;
         Ok(Self {
-            section: Section::new(pieces, fill, found.pieces),
             crossing: found.crossing,
+            section: Section::new(pieces, fill, found),
         })
     }
 
     /// The union of what the fill rule makes of each.
-    fn of_both(
-        mut pieces: Vec<Arc<Piece>>,
-        image: Vec<Arc<Piece>>,
-        fill: Fill,
-    ) -> Result<Self, RegionError> {
+    fn of_both(pieces: Vec<Piece>, image: Vec<Piece>, fill: Fill) -> Result<Self, RegionError> {
         let one = |w: &[Winding]| fill.is_inside(w[0]);
         // Where a curve crosses its image is no slip.
+        let (mut pieces, image) = (Arc::new(pieces), Arc::new(image));
         let crossing = filled(&pieces, &one, &|_| 0, 1)?.crossing;
         let crossing = crossing.or(filled(&image, &one, &|_| 0, 1)?.crossing);
         let count = pieces.len();
-        pieces.extend(image);
+        Arc::make_mut(&mut pieces).extend(Arc::unwrap_or_clone(image));
         let either = |w: &[Winding]| fill.is_inside(w[0]) || fill.is_inside(w[1]);
         let found = filled(&pieces, &either, &|i| usize::from(i >= count), 2)?;
         let tangle = RegionError::Tangle {
@@ -220,7 +287,7 @@ impl Outline {
 
 /// The boundary of what `inside` accepts of one profile's pieces.
 fn filled(
-    pieces: &[Arc<Piece>],
+    pieces: &Arc<Vec<Piece>>,
     inside: &dyn Fn(&[Winding]) -> bool,
     operand: &dyn Fn(usize) -> usize,
     operands: usize,
@@ -287,23 +354,23 @@ impl Region {
             .map(|(i, l)| chain(i, l))
             .collect::<Result<Vec<_>, _>>()?;
         let unit = into_unit(&mut chains)?;
-        let given = cuts(&chains);
-        let size = profile_size(&given);
-        refuse_thin(&given, rules.boundary, unit)?;
-        let whole = |cut: &[Vec<Cut>]| -> Result<Vec<Arc<Piece>>, RegionError> {
-            let mut pieces = Vec::with_capacity(cut.iter().map(Vec::len).sum());
-            for (i, cuts) in cut.iter().enumerate() {
-                assemble(i, cuts, size, unit, rules, &mut pieces)?;
+        let size = profile_size(&chains);
+        refuse_thin(&chains, rules.boundary, unit)?;
+        let whole = |chains: &[Chain]| -> Result<Vec<Piece>, RegionError> {
+            let count = |c: &Chain| c.runs.iter().map(Run::len).sum::<usize>();
+            let mut pieces = Vec::with_capacity(chains.iter().map(count).sum());
+            for (i, chain) in chains.iter().enumerate() {
+                assemble(i, chain, size, unit, rules, &mut pieces)?;
             }
+            pieces.shrink_to_fit();
             tabulate(&mut pieces);
             Ok(pieces)
         };
-        let pieces = whole(&given)?;
-        let crosses = rules.across == Across::Mirror && lowest(&given) < -BELOW_AXIS * size;
-        drop(given);
+        let pieces = whole(&chains)?;
+        let crosses = rules.across == Across::Mirror && lowest(&chains) < -BELOW_AXIS * size;
         let outline = if crosses {
             let image: Vec<Chain> = chains.iter().map(Chain::mirrored).collect();
-            Outline::of_both(pieces, whole(&cuts(&image))?, rules.fill)?
+            Outline::of_both(pieces, whole(&image)?, rules.fill)?
         } else {
             drop(chains);
             Outline::of(pieces, rules.fill)?
@@ -357,7 +424,7 @@ impl Region {
     }
 
     /// Pieces of the boundary of the filled region, parts on the axis included.
-    pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
+    pub(crate) fn boundary(&self) -> &FilledPieces {
         self.section.boundary()
     }
 
@@ -374,11 +441,11 @@ impl Region {
 }
 
 /// The Bézier pieces of a loop's curves.
-fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain, RegionError> {
+fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain<'_>, RegionError> {
     if curves.is_empty() {
         return Err(RegionError::Empty { loop_index });
     }
-    let mut pieces = Vec::new();
+    let mut runs = Vec::new();
     for (i, c) in curves.iter().enumerate() {
         let fault = |reason| RegionError::Curve {
             loop_index,
@@ -391,7 +458,12 @@ fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain, RegionError> 
             if !points.iter().flatten().all(|v| v.is_finite()) {
                 return Err(beyond());
             }
-            segments(points, back, i, &mut pieces);
+            runs.push(Run::Polyline {
+                points,
+                back,
+                scale: [1.0; 2],
+                curve: i,
+            });
             continue;
         }
         let made = curve::beziers(c).map_err(fault)?;
@@ -403,61 +475,50 @@ fn chain(loop_index: usize, curves: &ProfileLoop) -> Result<Chain, RegionError> 
             return Err(beyond());
         }
         let breaks = curve::breaks(c);
-        pieces.extend(made.into_iter().map(|bezier| Link {
-            breaks: breaks.contains(&bezier.interval[1]),
-            shape: Shape::Curved(Box::new(bezier)),
-            curve: i,
+        runs.extend(made.into_iter().map(|bezier| {
+            let link = Link {
+                breaks: breaks.contains(&bezier.interval[1]),
+                bezier,
+                curve: i,
+            };
+            let cuts = Vec::new();
+            Run::Curved(Box::new(Curved { link, cuts }))
         }));
     }
-    pieces.shrink_to_fit();
-    Ok(Chain { pieces })
-}
-
-/// The segments of a polyline.
-fn segments(points: &[[f64; 2]], back: bool, curve: usize, pieces: &mut Vec<Link>) {
-    pieces.reserve_exact(points.len() - 1);
-    #[allow(clippy::cast_possible_truncation, reason = "points are counted in u32")]
-    let segment = |i: usize| {
-        let (mut ends, mut numbers) = ([points[i], points[i + 1]], [i as u32, i as u32 + 1]);
-        if back {
-            ends.reverse();
-            numbers.reverse();
-        }
-        Link {
-            shape: Shape::Segment { ends, numbers },
-            curve,
-            breaks: false,
-        }
-    };
-    let count = points.len() - 1;
-    pieces.extend((0..count).map(|k| segment(if back { count - 1 - k } else { k })));
+    Ok(Chain { runs })
 }
 
 /// Scales everything by a power of two into the unit square; the unit in scene units.
 fn into_unit(chains: &mut [Chain]) -> Result<f64, RegionError> {
     // The unit comes from control points: it only has to bring the numbers near 1.
-    let reach = chains.iter().flat_map(|c| &c.pieces).map(|link| {
-        let points = link.bezier();
-        let points = points.points.iter();
-        points.fold(0.0_f64, |m, p| {
-            m.max((p[0] / p[2]).f64().abs())
-                .max((p[1] / p[2]).f64().abs())
-        })
+    let reach = chains.iter().flat_map(|c| &c.runs).map(|run| match run {
+        Run::Polyline { points, .. } => {
+            let coordinates = points.iter().flatten();
+            coordinates.fold(0.0_f64, |m, v| m.max(v.abs()))
+        }
+        Run::Curved(curved) => {
+            let points = curved.link.bezier.points.iter();
+            points.fold(0.0_f64, |m, p| {
+                m.max((p[0] / p[2]).f64().abs())
+                    .max((p[1] / p[2]).f64().abs())
+            })
+        }
     });
     let reach = reach.fold(0.0_f64, f64::max);
     if !(reach > 0.0 && reach.is_finite()) {
         return Err(RegionError::NoArea);
     }
     let unit = (reach.log2().floor() + 1.0).exp2();
-    for link in chains.iter_mut().flat_map(|c| &mut c.pieces) {
-        let bezier = match &mut link.shape {
-            Shape::Segment { ends, .. } => {
+    for run in chains.iter_mut().flat_map(|c| &mut c.runs) {
+        let curved = match run {
+            Run::Polyline { scale, .. } => {
                 // Exact, as every product with a power of two.
-                *ends = ends.map(|p| p.map(|v| v * (1.0 / unit)));
+                *scale = [1.0 / unit; 2];
                 continue;
             }
-            Shape::Curved(bezier) => bezier,
+            Run::Curved(curved) => curved,
         };
+        let bezier = &mut curved.link.bezier;
         for p in &mut bezier.points {
             p[0] = p[0].scale_by_power_of_two(1.0 / unit);
             p[1] = p[1].scale_by_power_of_two(1.0 / unit);
@@ -466,6 +527,7 @@ fn into_unit(chains: &mut [Chain]) -> Result<f64, RegionError> {
             *centre = centre.map(|c| c.scale_by_power_of_two(1.0 / unit));
             *radius = radius.scale_by_power_of_two(1.0 / unit);
         }
+        curved.cuts = piece::cuts(bezier);
     }
     Ok(unit)
 }
@@ -473,55 +535,68 @@ fn into_unit(chains: &mut [Chain]) -> Result<f64, RegionError> {
 /// A parameter and the point there.
 type CutPoint = (Dd, [Dd; 2]);
 
-/// A Bézier piece with its cuts.
+/// A piece of a loop with its cuts.
 struct Cut<'a> {
-    link: &'a Link,
-    /// Where a curve is cut, its ends included; `None` of segments that are whole.
-    at: Option<Box<[CutPoint]>>,
+    of: Of<'a>,
+    /// Which curve of the loop it is of.
+    curve: usize,
+    /// Whether the curve may jump where the piece ends.
+    breaks: bool,
 }
 
-impl<'a> Cut<'a> {
-    fn new(link: &'a Link) -> Self {
-        let whole =
-            matches!(link.shape, Shape::Segment { ends, .. } if ends.iter().all(|p| p[0] >= 0.0));
-        let at = (!whole).then(|| piece::cuts(&link.bezier()).into());
-        Self { link, at }
-    }
+/// What is cut.
+enum Of<'a> {
+    Segment(Segment),
+    Curved(&'a Curved),
+}
 
+/// Parameters and points of cuts; there are few of them.
+type CutPoints = SmallVec<[CutPoint; 2]>;
+
+impl Cut<'_> {
     /// Parameters and points of the cuts, both ends included.
-    fn at(&self) -> Cow<'_, [CutPoint]> {
-        match (&self.at, &self.link.shape) {
-            (Some(at), _) => Cow::Borrowed(at),
-            (None, Shape::Segment { ends, .. }) => {
-                let [a, b] = ends.map(|p| p.map(Dd::of));
-                Cow::Owned(vec![(Dd::ZERO, a), (Dd::ONE, b)])
+    fn at(&self) -> CutPoints {
+        match &self.of {
+            Of::Segment(segment) if segment.ends.iter().all(|p| p[0] >= 0.0) => {
+                let [a, b] = segment.ends.map(|p| p.map(Dd::of));
+                smallvec![(Dd::ZERO, a), (Dd::ONE, b)]
             }
-            (None, Shape::Curved(bezier)) => Cow::Owned(piece::cuts(bezier)),
+            Of::Segment(segment) => piece::cuts(&segment.bezier()).into(),
+            Of::Curved(curved) => curved.cuts.as_slice().into(),
         }
     }
-    fn start(&self) -> [Dd; 2] {
-        self.at()[0].1
-    }
-    fn end(&self) -> [Dd; 2] {
-        let at = self.at();
-        at[at.len() - 1].1
-    }
-}
 
-fn cuts(chains: &[Chain]) -> Vec<Vec<Cut<'_>>> {
-    (chains.iter())
-        .map(|c| c.pieces.iter().map(Cut::new).collect())
-        .collect()
+    fn start(&self) -> [Dd; 2] {
+        match &self.of {
+            Of::Segment(segment) => segment.ends[0].map(Dd::of),
+            Of::Curved(curved) => curved.cuts[0].1,
+        }
+    }
+
+    fn end(&self) -> [Dd; 2] {
+        match &self.of {
+            Of::Segment(segment) => segment.ends[1].map(Dd::of),
+            Of::Curved(curved) => curved.cuts[curved.cuts.len() - 1].1,
+        }
+    }
+
+    /// The parameters of its ends.
+    fn interval(&self) -> [f64; 2] {
+        match &self.of {
+            Of::Segment(segment) => segment.numbers.map(f64::from),
+            Of::Curved(curved) => curved.link.bezier.interval,
+        }
+    }
 }
 
 /// The least r of all.
-fn lowest(loops: &[Vec<Cut>]) -> f64 {
-    let lowest = |c: &Cut| (c.at().iter()).fold(f64::INFINITY, |m, (_, p)| m.min(p[0].f64()));
-    (loops.iter().flatten().map(lowest)).fold(f64::INFINITY, f64::min)
+fn lowest(chains: &[Chain]) -> f64 {
+    let lowest = |c: Cut| (c.at().iter()).fold(f64::INFINITY, |m, (_, p)| m.min(p[0].f64()));
+    (chains.iter().flat_map(Chain::cuts).map(lowest)).fold(f64::INFINITY, f64::min)
 }
 
 /// The longer side of the box around a boundary.
-fn boundary_size(boundary: &[BoundaryPiece]) -> f64 {
+fn boundary_size(boundary: &FilledPieces) -> f64 {
     let side = |c: usize| {
         let low = boundary.iter().map(|b| b.piece.bounds().min[c]);
         let high = boundary.iter().map(|b| b.piece.bounds().max[c]);
@@ -530,14 +605,14 @@ fn boundary_size(boundary: &[BoundaryPiece]) -> f64 {
     side(0).max(side(1))
 }
 
-fn profile_size(loops: &[Vec<Cut>]) -> f64 {
-    let [min, max] = extent(loops);
+fn profile_size(chains: &[Chain]) -> f64 {
+    let [min, max] = extent(chains);
     (max[0] - min[0]).max(max[1] - min[1])
 }
 
 /// An error where what is turned is so thin that its points fall together.
-fn refuse_thin(loops: &[Vec<Cut>], boundary: Boundary, unit: f64) -> Result<(), RegionError> {
-    let [mut min, mut max] = extent(loops);
+fn refuse_thin(chains: &[Chain], boundary: Boundary, unit: f64) -> Result<(), RegionError> {
+    let [mut min, mut max] = extent(chains);
     let coordinates = min.iter().chain(&max);
     let reach = coordinates.fold(0.0_f64, |m, c| m.max(c.abs()));
     if boundary == Boundary::ToAxis {
@@ -555,10 +630,10 @@ fn refuse_thin(loops: &[Vec<Cut>], boundary: Boundary, unit: f64) -> Result<(), 
 }
 
 /// The least and the largest coordinates.
-fn extent(loops: &[Vec<Cut>]) -> [[f64; 2]; 2] {
+fn extent(chains: &[Chain]) -> [[f64; 2]; 2] {
     let mut min = [f64::INFINITY; 2];
     let mut max = [f64::NEG_INFINITY; 2];
-    for cut in loops.iter().flatten() {
+    for cut in chains.iter().flat_map(Chain::cuts) {
         for (_, p) in cut.at().iter() {
             for c in 0..2 {
                 min[c] = min[c].min(p[c].f64());
@@ -572,35 +647,42 @@ fn extent(loops: &[Vec<Cut>]) -> [[f64; 2]; 2] {
 /// Adds the bi-monotone pieces of one loop, its gaps closed.
 fn assemble(
     loop_index: usize,
-    cuts: &[Cut],
+    chain: &Chain,
     size: f64,
     unit: f64,
     rules: &Rules,
-    pieces: &mut Vec<Arc<Piece>>,
+    pieces: &mut Vec<Piece>,
 ) -> Result<(), RegionError> {
     let open = loop_index == 0 && rules.boundary == Boundary::ToAxis;
     let allowed = rules.gap * size;
-    let first = pieces.len();
-    for (i, cut) in cuts.iter().enumerate() {
+    let before = pieces.len();
+    let mut cuts = chain.cuts().peekable();
+    let Some((first, start)) = cuts.peek().map(|c| (c.curve, c.start())) else {
+        return Err(RegionError::Empty { loop_index });
+    };
+    let mut end = start;
+    while let Some(cut) = cuts.next() {
         if rules.across == Across::Refuse {
-            stays_off(loop_index, cut, size, unit)?;
+            stays_off(loop_index, &cut, size, unit)?;
         }
-        add_pieces(loop_index, cut, pieces);
-        let last = i + 1 == cuts.len();
-        if last && open {
+        add_pieces(loop_index, &cut, pieces);
+        end = cut.end();
+        let next = cuts.peek();
+        if next.is_none() && open {
             break;
         }
-        let next = &cuts[if last { 0 } else { i + 1 }];
-        let (a, b) = (cut.end(), next.start());
+        let last = next.is_none();
+        let (next, b) = next.map_or((first, start), |c| (c.curve, c.start()));
+        let a = end;
         let gap = (a[0] - b[0]).f64().hypot((a[1] - b[1]).f64());
         if !(gap <= allowed) {
             let at = a.map(|c| c.f64() * unit);
             let (gap, allowed) = (gap * unit, allowed * unit);
-            return Err(if cut.link.breaks && !last {
+            return Err(if cut.breaks && !last {
                 RegionError::Jump {
                     loop_index,
-                    curve: cut.link.curve,
-                    parameter: cut.link.bezier().interval[1],
+                    curve: cut.curve,
+                    parameter: cut.interval()[1],
                     gap,
                     at,
                     allowed,
@@ -608,8 +690,8 @@ fn assemble(
             } else {
                 RegionError::Gap {
                     loop_index,
-                    curve: cut.link.curve,
-                    next: next.link.curve,
+                    curve: cut.curve,
+                    next,
                     gap,
                     at,
                     allowed,
@@ -619,25 +701,22 @@ fn assemble(
         push_segment(above_axis(a), above_axis(b), loop_index, pieces);
     }
     if open {
-        let (a, b) = (
-            above_axis(cuts[0].start()),
-            above_axis(cuts[cuts.len() - 1].end()),
-        );
+        let (a, b) = (above_axis(start), above_axis(end));
         let (foot_a, foot_b) = ([Dd::ZERO, a[1]], [Dd::ZERO, b[1]]);
         push_segment(b, foot_b, loop_index, pieces);
         push_segment(foot_b, foot_a, loop_index, pieces);
         push_segment(foot_a, a, loop_index, pieces);
     }
     // What lies beyond the axis may leave nothing of a loop.
-    if pieces.len() == first && rules.across == Across::Refuse {
+    if pieces.len() == before && rules.across == Across::Refuse {
         return Err(RegionError::NoArea);
     }
     Ok(())
 }
 
-fn push_segment(a: [Dd; 2], b: [Dd; 2], loop_index: usize, pieces: &mut Vec<Arc<Piece>>) {
+fn push_segment(a: [Dd; 2], b: [Dd; 2], loop_index: usize, pieces: &mut Vec<Piece>) {
     if a != b {
-        pieces.push(Arc::new(Piece::segment(a, b, loop_index)));
+        pieces.push(Piece::segment(a, b, loop_index));
     }
 }
 
@@ -648,7 +727,7 @@ fn above_axis(p: [Dd; 2]) -> [Dd; 2] {
 
 /// Refuses a curve that crosses the axis.
 fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), RegionError> {
-    let [u0, u1] = cut.link.bezier().interval;
+    let [u0, u1] = cut.interval();
     let at = cut.at();
     let lowest = at.iter().min_by(|a, b| {
         a.1[0]
@@ -658,7 +737,7 @@ fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), R
     match lowest {
         Some((t, p)) if p[0].f64() < -BELOW_AXIS * size => Err(RegionError::BelowAxis {
             loop_index,
-            curve: cut.link.curve,
+            curve: cut.curve,
             r: p[0].f64() * unit,
             parameter: u0 + (u1 - u0) * t.f64(),
             allowed: -BELOW_AXIS * size * unit,
@@ -668,10 +747,14 @@ fn stays_off(loop_index: usize, cut: &Cut, size: f64, unit: f64) -> Result<(), R
 }
 
 /// Adds the bi-monotone pieces of one piece; what is beyond the axis is laid on it, which changes no winding off it.
-fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Arc<Piece>>) {
-    let bezier = cut.link.bezier();
-    let (points, circle) = (bezier.points.clone(), bezier.circle);
-    let whole = Piece::new(points, cut.start(), cut.end(), loop_index, circle);
+fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Piece>) {
+    let whole = match &cut.of {
+        Of::Segment(_) => Piece::segment(cut.start(), cut.end(), loop_index),
+        Of::Curved(curved) => {
+            let (points, circle) = (curved.link.bezier.points.clone(), curved.link.bezier.circle);
+            Piece::new(points, cut.start(), cut.end(), loop_index, circle)
+        }
+    };
     for w in cut.at().windows(2) {
         let ((a, from), (b, to)) = (w[0], w[1]);
         let middle = if whole.degree() == 1 {
@@ -690,14 +773,14 @@ fn add_pieces(loop_index: usize, cut: &Cut, pieces: &mut Vec<Arc<Piece>>) {
         } else if whole.degree() == 1 {
             push_segment(start, end, loop_index, pieces);
         } else {
-            pieces.push(Arc::new(whole.part(a, b, start, end)));
+            pieces.push(whole.part(a, b, start, end));
         }
     }
 }
 
 /// Fills the pieces' tables of points at uniform parameters. All pieces of a degree share one
 /// cached table of basis functions, so a piece costs three contractions of it.
-fn tabulate(pieces: &mut [Arc<Piece>]) {
+fn tabulate(pieces: &mut [Piece]) {
     static CACHE: OnceLock<BasisCache> = OnceLock::new();
     let cache = CACHE.get_or_init(BasisCache::default);
     #[allow(clippy::cast_precision_loss, reason = "a small count")]
@@ -710,7 +793,7 @@ fn tabulate(pieces: &mut [Arc<Piece>]) {
         nurbs::tabulate(cache.kernel(), &table, &[wr, wz], w, &mut [&mut r, &mut z]).ok()?;
         Some(r.into_iter().zip(z).map(|(r, z)| [r, z]).collect())
     };
-    for piece in pieces.iter_mut().filter_map(Arc::get_mut) {
+    for piece in pieces {
         piece.tabulate(table);
     }
 }

@@ -438,10 +438,9 @@ pub(super) mod tests {
         ]
     }
 
-    pub(in crate::region) fn swept(region: &Region) -> Vec<BoundaryPiece> {
+    pub(in crate::region) fn swept(region: &Region) -> Vec<BoundaryPiece<'_>> {
         (region.boundary().iter())
             .filter(|b| !b.piece.on_axis)
-            .cloned()
             .collect()
     }
 
@@ -463,7 +462,7 @@ pub(super) mod tests {
         for (name, region) in regions() {
             for voxels in [40.0, 300.0, 2000.0] {
                 let swept = swept(&region);
-                let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
+                let exact = DistanceSet::new(swept.iter().map(|b| b.piece));
                 let top = swept
                     .iter()
                     .fold(0.0_f64, |m, b| m.max(b.piece.bounds().max[1]));
@@ -572,8 +571,9 @@ pub(super) mod tests {
                 [apex, 0.0],
             ];
             let region = Region::new(&[vec![polyline(&corners)]], Boundary::Closed, Fill::EvenOdd);
-            let swept = swept(&region.expect("a region"));
-            let exact = DistanceSet::new(swept.iter().map(|b| &*b.piece));
+            let region = region.expect("a region");
+            let swept = swept(&region);
+            let exact = DistanceSet::new(swept.iter().map(|b| b.piece));
             // The region's unit is its own.
             let furthest = |m: f64, b: &BoundaryPiece| m.max(b.piece.bounds().max[0]);
             let cell = swept.iter().fold(0.0, furthest) / (apex + 2000.0);
@@ -620,7 +620,8 @@ pub(super) mod tests {
             .collect();
         saw.extend([[2.0, 0.006], [2.0, 0.0], [1.0, 0.0]]);
         let region = Region::new(&[vec![polyline(&saw)]], Boundary::Closed, Fill::EvenOdd);
-        let swept = swept(&region.expect("a region"));
+        let region = region.expect("a region");
+        let swept = swept(&region);
         let chain = Chain::new(&swept, 1e-9, 100_000, true).expect("few arcs");
         let extent = Extent {
             r: [0.0, 20.0],

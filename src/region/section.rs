@@ -1,6 +1,6 @@
 //! Membership in a closed region of the half-plane.
 
-use super::boundary::BoundaryPiece;
+use super::boundary::{FilledBoundary, FilledPieces};
 use super::crossings::{CrossingSet, MeridianPoint};
 use super::piece::Piece;
 use super::profile::Fill;
@@ -12,59 +12,53 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub(crate) struct Section {
     fill: Fill,
-    pieces: Vec<Arc<Piece>>,
+    pieces: Arc<Vec<Piece>>,
     crossings: CrossingSet,
     /// Pieces of the boundary of the filled region: an even-odd membership of its own.
-    boundary: Vec<BoundaryPiece>,
+    boundary: FilledPieces,
     /// Their crossings, where they are not just the pieces of the loops.
-    closed: Option<(Vec<Arc<Piece>>, CrossingSet)>,
+    closed: Option<CrossingSet>,
 }
 
 impl Section {
-    /// The region that the fill rule makes of the pieces, and the boundary of it.
-    pub(crate) fn new(
-        mut pieces: Vec<Arc<Piece>>,
-        fill: Fill,
-        mut boundary: Vec<BoundaryPiece>,
-    ) -> Self {
-        pieces.shrink_to_fit();
-        boundary.shrink_to_fit();
-        let mut both = pieces.iter().zip(&boundary);
-        let same = pieces.len() == boundary.len() && both.all(|(p, b)| Arc::ptr_eq(p, &b.piece));
-        let closed = (!same).then(|| {
-            let closed: Vec<Arc<Piece>> = boundary.iter().map(|b| b.piece.clone()).collect();
-            let crossings = CrossingSet::new(&closed);
-            (closed, crossings)
-        });
+    /// The region that the fill rule makes of the pieces, with the boundary found of it.
+    pub(crate) fn new(pieces: Arc<Vec<Piece>>, fill: Fill, found: FilledBoundary) -> Self {
+        let boundary = found.pieces;
+        let same = Arc::ptr_eq(&pieces, boundary.shared());
+        let crossings = found.crossings;
         Self {
             fill,
-            crossings: CrossingSet::new(&pieces),
+            crossings: crossings.unwrap_or_else(|| CrossingSet::new(&pieces)),
+            closed: (!same).then(|| CrossingSet::new(boundary.shared())),
             pieces,
             boundary,
-            closed,
         }
     }
 
     /// The region that a boundary encloses.
-    pub(crate) fn enclosed(boundary: Vec<BoundaryPiece>) -> Self {
-        let pieces = boundary.iter().map(|b| b.piece.clone()).collect();
-        Self::new(pieces, Fill::EvenOdd, boundary)
+    pub(crate) fn enclosed(boundary: FilledPieces) -> Self {
+        Self {
+            fill: Fill::EvenOdd,
+            crossings: CrossingSet::new(boundary.shared()),
+            closed: None,
+            pieces: boundary.shared().clone(),
+            boundary,
+        }
     }
 
     /// Pieces of all loops, filled on both sides or not.
-    pub(crate) fn pieces(&self) -> &[Arc<Piece>] {
+    pub(crate) fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
     /// Pieces of the boundary of the filled region, parts on the axis included.
-    pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
+    pub(crate) fn boundary(&self) -> &FilledPieces {
         &self.boundary
     }
 
     /// A tree over the boxes of [`boundary`](Self::boundary).
     pub(crate) fn boundary_tree(&self) -> &BoxTree {
-        let closed = self.closed.as_ref().map(|(_, crossings)| crossings);
-        closed.unwrap_or(&self.crossings).tree()
+        self.closed.as_ref().unwrap_or(&self.crossings).tree()
     }
 
     /// A tree over the boxes of [`pieces`](Self::pieces).
@@ -82,9 +76,7 @@ impl Section {
         let [r, z] = exact();
         let (winding, on) = self.crossings.count_exact(&self.pieces, r, z);
         // A curve with the same state on both sides is not the region's boundary.
-        let meets = |(pieces, crossings): &(Vec<Arc<Piece>>, CrossingSet)| {
-            crossings.count_exact(pieces, r, z).1
-        };
+        let meets = |crossings: &CrossingSet| crossings.count_exact(self.boundary.shared(), r, z).1;
         if on && self.closed.as_ref().is_none_or(meets) {
             Side::On
         } else {

@@ -270,11 +270,11 @@ mod tests {
         let mut chains = Vec::new();
         for (name, region) in regions() {
             let swept = swept(&region);
-            let whole = region.boundary();
+            let whole: Vec<_> = region.boundary().iter().collect();
             for (kind, pieces, mirrored) in [
                 ("mirrored", &*swept, true),
                 ("open", &swept, false),
-                ("section", whole, false),
+                ("section", &whole, false),
                 ("part", &swept[..swept.len().div_ceil(2)], true),
             ] {
                 let chain = Chain::new(pieces, 1e-6, 100_000, mirrored).expect("few arcs");

@@ -71,8 +71,13 @@ const LEAF: usize = 2;
 
 impl BoxTree {
     pub(crate) fn new(boxes: &[Box2]) -> Self {
+        Self::over(boxes.len(), |i| boxes[i as usize])
+    }
+
+    /// A tree over boxes that are made whenever they are looked at.
+    pub(crate) fn over(count: usize, bounds_of: impl Fn(u32) -> Box2) -> Self {
         #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
-        let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
+        let mut items: Vec<u32> = (0..count as u32).collect();
         let mut nodes = vec![Node {
             bounds: Box2::EMPTY,
             first: 0,
@@ -82,9 +87,7 @@ impl BoxTree {
         let mut work = vec![(0_usize, 0_usize, items.len())];
         while let Some((node, from, to)) = work.pop() {
             let run = &mut items[from..to];
-            let bounds = run
-                .iter()
-                .fold(Box2::EMPTY, |b, &i| b.union(&boxes[i as usize]));
+            let bounds = run.iter().fold(Box2::EMPTY, |b, &i| b.union(&bounds_of(i)));
             #[allow(clippy::cast_possible_truncation, reason = "pieces are counted in u32")]
             if run.len() <= LEAF {
                 nodes[node] = Node {
@@ -95,7 +98,10 @@ impl BoxTree {
                 continue;
             }
             let axis = usize::from(bounds.max[1] - bounds.min[1] > bounds.max[0] - bounds.min[0]);
-            let centre = |i: u32| boxes[i as usize].min[axis] + boxes[i as usize].max[axis];
+            let centre = |i: u32| {
+                let b = bounds_of(i);
+                b.min[axis] + b.max[axis]
+            };
             let middle = run.len() / 2;
             run.select_nth_unstable_by(middle, |&a, &b| {
                 centre(a).total_cmp(&centre(b)).then(a.cmp(&b))

@@ -4,7 +4,7 @@
 //! vertex must belong to an even number of ends. Pieces of several solids meet within roundings,
 //! so their ends are brought together here, and what does not close is told.
 
-use super::boundary::BoundaryPiece;
+use super::boundary::FilledPieces;
 use super::piece::Piece;
 use crate::math::{Dd, Real};
 use std::sync::Arc;
@@ -33,32 +33,30 @@ impl Clusters {
 }
 
 /// Brings ends nearer than `tolerance` together; `None` where the pieces then do not close.
-pub(crate) fn welded(boundary: Vec<BoundaryPiece>, tolerance: f64) -> Option<Vec<BoundaryPiece>> {
-    let ends: Vec<[Dd; 2]> = boundary
-        .iter()
-        .flat_map(|b| [b.piece.start, b.piece.end])
-        .collect();
+pub(crate) fn welded(boundary: FilledPieces, tolerance: f64) -> Option<FilledPieces> {
+    let pieces = boundary.shared();
+    let ends: Vec<[Dd; 2]> = (pieces.iter()).flat_map(|p| [p.start(), p.end()]).collect();
     let mut order: Vec<usize> = (0..ends.len()).collect();
     let key = |i: usize| ends[i].map(Real::f64);
     order.sort_by(|&i, &j| key(i)[1].total_cmp(&key(j)[1]).then(i.cmp(&j)));
     let mut clusters = Clusters((0..ends.len()).collect());
     join_near(&ends, &order, tolerance, &mut clusters);
-    let odd = odd_vertices(&boundary, &mut clusters);
+    let odd = odd_vertices(ends.len(), &mut clusters);
     if !odd.is_empty() {
         let lonely: Vec<usize> = order.iter().copied().filter(|i| odd.contains(i)).collect();
         join_near(&ends, &lonely, LOOSE, &mut clusters);
-        if !odd_vertices(&boundary, &mut clusters).is_empty() {
+        if !odd_vertices(ends.len(), &mut clusters).is_empty() {
             return None;
         }
     }
     // A flat face stays in its plane and a cylinder on its radius, whatever curve ends there.
     let mut place: Vec<[Option<(u8, Dd)>; 2]> = vec![[None; 2]; ends.len()];
     for (i, end) in ends.iter().enumerate() {
-        let piece = &boundary[i / 2].piece;
+        let piece = &pieces[i / 2];
         let at = &mut place[clusters.root(i)];
         for c in 0..2 {
             let weight = match piece.degree() {
-                1 if piece.start[c] == piece.end[c] => 2,
+                1 if piece.start()[c] == piece.end()[c] => 2,
                 1 => 1,
                 _ => 0,
             };
@@ -72,17 +70,14 @@ pub(crate) fn welded(boundary: Vec<BoundaryPiece>, tolerance: f64) -> Option<Vec
         let root = clusters.root(i);
         [0, 1].map(|c| place[root][c].map_or(ends[i][c], |(_, v)| v))
     };
-    let moved = boundary.into_iter().enumerate();
-    Some(
-        moved
-            .filter_map(|(k, b)| {
-                Some(BoundaryPiece {
-                    piece: between(b.piece, at(2 * k), at(2 * k + 1))?,
-                    forward: b.forward,
-                })
-            })
-            .collect(),
-    )
+    let (pieces, forward) = boundary.into_parts();
+    let pieces = Arc::unwrap_or_clone(pieces).into_iter().zip(forward);
+    let (pieces, forward) = (pieces.enumerate())
+        .filter_map(|(k, (piece, forward))| {
+            Some((between(piece, at(2 * k), at(2 * k + 1))?, forward))
+        })
+        .unzip();
+    Some(FilledPieces::new(pieces, forward))
 }
 
 /// Joins the points of `order`, which rises in z, that are nearer than `tolerance`.
@@ -100,12 +95,9 @@ fn join_near(ends: &[[Dd; 2]], order: &[usize], tolerance: f64, clusters: &mut C
 }
 
 /// Roots of the clusters that an odd number of ends belong to.
-fn odd_vertices(
-    boundary: &[BoundaryPiece],
-    clusters: &mut Clusters,
-) -> std::collections::BTreeSet<usize> {
+fn odd_vertices(ends: usize, clusters: &mut Clusters) -> std::collections::BTreeSet<usize> {
     let mut odd = std::collections::BTreeSet::new();
-    for k in 0..2 * boundary.len() {
+    for k in 0..ends {
         let root = clusters.root(k);
         if !odd.remove(&root) {
             odd.insert(root);
@@ -115,12 +107,12 @@ fn odd_vertices(
 }
 
 /// The piece with its ends moved by a rounding; `None` where nothing is left of it.
-fn between(piece: Arc<Piece>, start: [Dd; 2], end: [Dd; 2]) -> Option<Arc<Piece>> {
+fn between(piece: Piece, start: [Dd; 2], end: [Dd; 2]) -> Option<Piece> {
     if start == end {
         return None;
     }
-    if start == piece.start && end == piece.end {
+    if start == piece.start() && end == piece.end() {
         return Some(piece);
     }
-    Some(Arc::new(Arc::unwrap_or_clone(piece).with_ends(start, end)))
+    Some(piece.with_ends(start, end))
 }

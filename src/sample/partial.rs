@@ -127,12 +127,13 @@ impl PartialSampler {
             let z = [a.min(b), a.max(b)];
             MeridianField::new(kernel, chain, Extent { r, z, cell })
         };
-        let pieces = body.boundary().iter().filter(|b| !b.piece.on_axis);
-        let pieces: Vec<_> = pieces.cloned().collect();
+        let all: Vec<_> = body.boundary().iter().collect();
+        let pieces = all.iter().copied().filter(|b| !b.piece.on_axis);
+        let pieces: Vec<_> = pieces.collect();
         let [low, high] = caps.reach().map(|a| a / scale);
         let (swept, edges) = rayon::join(
             || field(&pieces, [0.0, f64::from(plane.reach()) * cell], true),
-            || field(body.boundary(), [low - cell, high + cell], false),
+            || field(&all, [low - cell, high + cell], false),
         );
         let (swept, edges) = (swept?, edges?);
         #[allow(clippy::cast_possible_truncation, reason = "a bound with room")]

@@ -102,7 +102,6 @@ impl RadialSampler {
         let plane = Plane::new(grid, [axis[0], axis[1]], spacing.x / parts)?;
         let swept: Vec<_> = (body.boundary().iter())
             .filter(|b| !b.piece.on_axis)
-            .cloned()
             .collect();
         let chain = Chain::new(&swept, ARCS * least, MOST_ARCS, true)?;
         let height = |k: usize| frame.to_local_exact(grid.centre(0, 0, k))[2].f64();

@@ -118,7 +118,6 @@ impl TiltedSampler {
         }
         let swept: Vec<_> = (body.boundary().iter())
             .filter(|b| !b.piece.on_axis)
-            .cloned()
             .collect();
         let chain = Chain::new(&swept, ARCS * least / scale, MOST_ARCS, true)?;
         let field = MeridianField::new(kernel, chain, extent)?;

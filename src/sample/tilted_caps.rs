@@ -108,7 +108,8 @@ impl TiltedCaps {
         if !pays(&extent, grid) {
             return None;
         }
-        let chain = Chain::new(body.boundary(), ARCS * least / scale, MOST_ARCS, false)?;
+        let edges: Vec<_> = body.boundary().iter().collect();
+        let chain = Chain::new(&edges, ARCS * least / scale, MOST_ARCS, false)?;
         let field = MeridianField::new(kernel, chain, extent)?;
         let table = CellTable::new(&field, scale, CELLS * least / scale)?;
         let per = table.places();

@@ -20,6 +20,7 @@ use crate::solid::{
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::io::Write as _;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
@@ -336,11 +337,15 @@ impl Scene {
     }
 
     /// BLAKE3 of the resolved scene, in hexadecimal.
+    ///
+    /// # Panics
+    /// Never: a digest takes whatever is written to it.
     #[must_use]
     pub fn hash(&self) -> String {
-        blake3::hash(self.model.resolve().to_string().as_bytes())
-            .to_hex()
-            .to_string()
+        let mut digest = std::io::BufWriter::new(blake3::Hasher::new());
+        let written = (self.model.write_resolved(&mut digest)).and_then(|()| digest.flush());
+        written.expect("a digest takes all");
+        digest.get_ref().finalize().to_hex().to_string()
     }
 
     /// The grid that the scene asks for.

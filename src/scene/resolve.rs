@@ -4,7 +4,8 @@
 //! text, bit for bit. Keys are in alphabetical order and floats in their shortest form that reads
 //! back exactly, so equal scenes have equal text and the text can be hashed.
 
-use serde_json::{Map, Value, json};
+use serde::ser::{Serialize, SerializeMap as _, Serializer};
+use serde_json::Value;
 
 use super::model::{
     Across, AxisModel, CurveForm, CurveKind, CurveModel, GridModel, GridStep, OutputModel,
@@ -14,12 +15,90 @@ use super::model::{
 use crate::math::tolerance::GAP;
 use crate::solid::Shape;
 
+/// [`serde_json::json!`] as a [`Node`].
+macro_rules! json {
+    ($value:expr) => {
+        Node::Plain(serde_json::json!($value))
+    };
+}
+
+/// What has no value.
+const NOTHING: Node<'static> = Node::Plain(Value::Null);
+
+/// A value of the JSON form. A scene may have very many points: they are not copied.
+enum Node<'a> {
+    Plain(Value),
+    Points(&'a [PointModel]),
+    List(Vec<Node<'a>>),
+    /// Keys in alphabetical order.
+    Table(Vec<(String, Node<'a>)>),
+}
+
+impl<'a> FromIterator<Node<'a>> for Node<'a> {
+    fn from_iter<I: IntoIterator<Item = Node<'a>>>(nodes: I) -> Self {
+        Self::List(nodes.into_iter().collect())
+    }
+}
+
+impl Node<'_> {
+    fn is_null(&self) -> bool {
+        matches!(self, Self::Plain(Value::Null))
+    }
+}
+
+impl Serialize for Node<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Plain(value) => value.serialize(serializer),
+            Self::Points(points) => serializer.collect_seq(points.iter().map(|p| [p.r, p.z])),
+            Self::List(nodes) => serializer.collect_seq(nodes),
+            Self::Table(entries) => {
+                let mut map = serializer.serialize_map(Some(entries.len()))?;
+                for (key, node) in entries {
+                    map.serialize_entry(key, node)?;
+                }
+                map.end()
+            }
+        }
+    }
+}
+
 impl SceneModel {
     /// The scene in full: a valid scene in its JSON form.
     ///
     /// Defaults are written out, points from files are inlined, profiles are ordered by name.
     /// What has no value (a band, explicit bounds, a chosen zero-angle direction) is left out.
+    ///
+    /// # Panics
+    /// Never: whatever a scene holds has a JSON form.
     pub fn resolve(&self) -> Value {
+        serde_json::to_value(self.node()).expect("keys are text")
+    }
+
+    /// The text of [`resolve`](Self::resolve), written piece by piece.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub(crate) fn write_resolved(&self, to: impl std::io::Write) -> std::io::Result<()> {
+        Ok(serde_json::to_writer(to, &self.node())?)
+    }
+
+    /// As [`write_resolved`](Self::write_resolved), indented.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    #[cfg_attr(
+        not(feature = "cli"),
+        allow(dead_code, reason = "only a command writes whole manifests of scenes")
+    )]
+    pub(crate) fn write_resolved_indented(
+        &self,
+        to: &mut dyn std::io::Write,
+    ) -> std::io::Result<()> {
+        Ok(serde_json::to_writer_pretty(to, &self.node())?)
+    }
+
+    fn node(&self) -> Node<'_> {
         let materials = self
             .materials
             .iter()
@@ -42,12 +121,12 @@ impl SceneModel {
             ),
             (
                 "reference",
-                self.reference.as_ref().map_or(Value::Null, reference),
+                self.reference.as_ref().map_or(NOTHING, reference),
             ),
         ])
     }
 
-    fn solid(&self, model: &SolidModel) -> Value {
+    fn solid<'a>(&'a self, model: &'a SolidModel) -> Node<'a> {
         let mut keys = vec![
             ("name", json!(model.name)),
             ("axis", axis(&model.axis)),
@@ -85,7 +164,7 @@ impl SceneModel {
 }
 
 impl SceneModel {
-    fn volume(&self, model: &VolumeModel) -> Vec<(&'static str, Value)> {
+    fn volume<'a>(&'a self, model: &'a VolumeModel) -> Vec<(&'static str, Node<'a>)> {
         match &model.source {
             VolumeSource::Patches(patches) => {
                 vec![("patches", patches.iter().map(patch).collect())]
@@ -128,14 +207,14 @@ impl SceneModel {
     }
 }
 
-fn turned(turn: &TurnModel) -> [(&'static str, Value); 2] {
+fn turned(turn: &TurnModel) -> [(&'static str, Node<'static>); 2] {
     [("angle", json!(turn.angle)), ("start", json!(turn.start))]
 }
 
-fn patch(model: &PatchModel) -> Value {
+fn patch(model: &PatchModel) -> Node<'static> {
     let fields = model.fields.iter();
     let fields = match model.fields.as_slice() {
-        [] => Value::Null,
+        [] => NOTHING,
         _ => sorted(fields.map(|f| (f.name.clone(), json!(f.values)))),
     };
     object([
@@ -148,14 +227,14 @@ fn patch(model: &PatchModel) -> Value {
 }
 
 /// An object whose keys are in alphabetical order, whichever map `serde_json` was built with.
-fn sorted(entries: impl IntoIterator<Item = (String, Value)>) -> Value {
+fn sorted<'a>(entries: impl IntoIterator<Item = (String, Node<'a>)>) -> Node<'a> {
     let mut entries: Vec<_> = entries.into_iter().collect();
     entries.sort_by(|a, b| a.0.cmp(&b.0));
-    Value::Object(Map::from_iter(entries))
+    Node::Table(entries)
 }
 
 /// As [`sorted`]; entries that are `null` are left out.
-fn object<const N: usize>(entries: [(&str, Value); N]) -> Value {
+fn object<'a, const N: usize>(entries: [(&str, Node<'a>); N]) -> Node<'a> {
     sorted(
         entries
             .into_iter()
@@ -165,20 +244,20 @@ fn object<const N: usize>(entries: [(&str, Value); N]) -> Value {
 }
 
 /// Nothing where `plain`, else the value.
-fn unless(plain: bool, value: Value) -> Value {
-    if plain { Value::Null } else { value }
+fn unless(plain: bool, value: Node<'_>) -> Node<'_> {
+    if plain { NOTHING } else { value }
 }
 
-fn grid(model: &GridModel) -> Value {
+fn grid(model: &GridModel) -> Node<'static> {
     let (resolution, spacing, origin, dims) = match model.step {
-        GridStep::Resolution(n) => (json!(n), Value::Null, Value::Null, Value::Null),
-        GridStep::Resolutions(n) => (json!(n), Value::Null, Value::Null, Value::Null),
-        GridStep::Spacing(spacing) => (Value::Null, json!(spacing), Value::Null, Value::Null),
+        GridStep::Resolution(n) => (json!(n), NOTHING, NOTHING, NOTHING),
+        GridStep::Resolutions(n) => (json!(n), NOTHING, NOTHING, NOTHING),
+        GridStep::Spacing(spacing) => (NOTHING, json!(spacing), NOTHING, NOTHING),
         GridStep::Verbatim {
             origin,
             spacing,
             dims,
-        } => (Value::Null, json!(spacing), json!(origin), json!(dims)),
+        } => (NOTHING, json!(spacing), json!(origin), json!(dims)),
     };
     object([
         ("resolution", resolution),
@@ -190,26 +269,29 @@ fn grid(model: &GridModel) -> Value {
     ])
 }
 
-fn output(model: &OutputModel) -> Value {
+fn output(model: &OutputModel) -> Node<'static> {
     object([
         (
             "channels",
-            model.channels.iter().map(|name| name.name()).collect(),
+            (model.channels.iter())
+                .map(|channel| json!(channel.name()))
+                .collect(),
         ),
         (
             "formats",
-            model.formats.iter().map(|name| name.name()).collect(),
+            (model.formats.iter())
+                .map(|format| json!(format.name()))
+                .collect(),
         ),
         ("compression", json!(model.compression.name())),
         ("band", json!(model.band)),
     ])
 }
 
-fn profile(model: &ProfileModel) -> Value {
-    let chain = |curves: &Vec<CurveModel>| curves.iter().map(curve).collect::<Value>();
+fn profile(model: &ProfileModel) -> Node<'_> {
     let loops = match model.loops.as_slice() {
-        [] => Value::Null,
-        loops => loops.iter().map(chain).collect(),
+        [] => NOTHING,
+        loops => loops.iter().map(|l| chain(l)).collect(),
     };
     object([
         ("boundary", json!(model.boundary.name())),
@@ -220,18 +302,20 @@ fn profile(model: &ProfileModel) -> Value {
             "across",
             unless(model.across == Across::Refuse, json!(model.across.name())),
         ),
-        ("curves", model.curves.as_ref().map_or(Value::Null, chain)),
+        (
+            "curves",
+            model.curves.as_ref().map_or(NOTHING, |c| chain(c)),
+        ),
         ("loops", loops),
     ])
 }
 
-fn curve(model: &CurveModel) -> Value {
-    let points = |points: &[PointModel]| -> Value {
-        points
-            .iter()
-            .map(|point| json!([point.r, point.z]))
-            .collect()
-    };
+fn chain(curves: &[CurveModel]) -> Node<'_> {
+    curves.iter().map(curve).collect()
+}
+
+fn curve(model: &CurveModel) -> Node<'_> {
+    let points = |points| Node::Points(points);
     let reverse = ("reverse", json!(model.reverse));
     match &model.kind {
         CurveKind::Nurbs {
@@ -303,7 +387,7 @@ fn curve(model: &CurveModel) -> Value {
     }
 }
 
-fn reference(model: &ReferenceModel) -> Value {
+fn reference(model: &ReferenceModel) -> Node<'static> {
     let mut keys = round(model.shape);
     keys.push(("axis", axis(&model.axis)));
     keys.push(("place", model.steps.iter().map(step).collect()));
@@ -311,7 +395,7 @@ fn reference(model: &ReferenceModel) -> Value {
 }
 
 /// Kind and sizes of a shape.
-fn round(shape: Shape) -> Vec<(&'static str, Value)> {
+fn round(shape: Shape) -> Vec<(&'static str, Node<'static>)> {
     match shape {
         Shape::Torus { major, minor } => vec![
             ("kind", json!("torus")),
@@ -337,7 +421,7 @@ fn round(shape: Shape) -> Vec<(&'static str, Value)> {
     }
 }
 
-fn axis(model: &AxisModel) -> Value {
+fn axis(model: &AxisModel) -> Node<'static> {
     object([
         ("origin", json!(model.origin)),
         ("direction", json!(model.direction)),
@@ -345,7 +429,7 @@ fn axis(model: &AxisModel) -> Value {
     ])
 }
 
-fn step(step: &PlaceStep) -> Value {
+fn step(step: &PlaceStep) -> Node<'static> {
     match step {
         PlaceStep::Scale(factor) => object([("scale", json!(factor))]),
         PlaceStep::Rotate { axis, degrees } => object([(

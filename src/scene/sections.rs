@@ -27,7 +27,6 @@ use crate::math::bernstein;
 use crate::math::{Dd, Real};
 use crate::nurbs::{KnotVector, NurbsError, NurbsSurface, NurbsVolume, OrientationError};
 use crate::region::{Piece, Region};
-use std::sync::Arc;
 
 /// Share of the region's size within which heights, and ends of curves, are one.
 const SAME: f64 = 1e-12;
@@ -114,7 +113,7 @@ fn mapped(
 
 /// A piece of the boundary along which z rises.
 struct Side {
-    piece: Arc<Piece>,
+    piece: Piece,
     /// Whether the region is at its left.
     right: bool,
     heights: [f64; 2],
@@ -135,8 +134,8 @@ impl Slabs {
     fn new(region: &Region) -> Result<Self, String> {
         let tolerance = SAME * region.size();
         let mut sides = Vec::new();
-        for b in region.boundary() {
-            let heights = [b.piece.start, b.piece.end].map(|p| p[1].f64());
+        for b in region.boundary().iter() {
+            let heights = [b.piece.start(), b.piece.end()].map(|p| p[1].f64());
             if (heights[1] - heights[0]).abs() > tolerance {
                 let up = heights[1] > heights[0];
                 sides.push(Side {
@@ -218,7 +217,7 @@ impl Slabs {
 
     /// The parameter of a side at a height; its end where the height is that of the end.
     fn parameter(&self, side: &Side, level: f64) -> Dd {
-        let ends = [side.piece.start, side.piece.end].map(|p| p[1].f64());
+        let ends = [side.piece.start(), side.piece.end()].map(|p| p[1].f64());
         for (end, t) in ends.into_iter().zip([Dd::ZERO, Dd::ONE]) {
             if (end - level).abs() <= self.tolerance {
                 return t;

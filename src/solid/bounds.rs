@@ -13,9 +13,9 @@ use super::turn::Turn;
 use crate::math::Side;
 use crate::math::bernstein::{self, Coefficients};
 use crate::math::{Aabb, Dd, Real, Similarity};
-use crate::region::BoundaryPiece;
+use crate::region::FilledPieces;
 
-pub(super) fn bounds(frame: &Similarity, turn: &Turn, boundary: &[BoundaryPiece]) -> Aabb {
+pub(super) fn bounds(frame: &Similarity, turn: &Turn, boundary: &FilledPieces) -> Aabb {
     let scale = frame.scale_exact();
     Aabb::around(frame.origin_exact(), |k, sign| {
         let sign = Dd::of(sign);
@@ -47,16 +47,16 @@ fn largest_over_turn(turn: &Turn, v: [Dd; 2]) -> Dd {
 }
 
 /// The largest a z + m r on the boundary.
-fn support(boundary: &[BoundaryPiece], a: Dd, m: Dd) -> Dd {
+fn support(boundary: &FilledPieces, a: Dd, m: Dd) -> Dd {
     let value = |p: [Dd; 2]| a * p[1] + m * p[0];
     let ends = boundary
         .iter()
-        .flat_map(|b| [value(b.piece.start), value(b.piece.end)]);
+        .flat_map(|b| [value(b.piece.start()), value(b.piece.end())]);
     let mut best = ends.fold(Dd::of(f64::NEG_INFINITY), |m, v| if v > m { v } else { m });
     if a == Dd::ZERO || m == Dd::ZERO {
         return best;
     }
-    for piece in boundary.iter().map(|b| &b.piece).filter(|p| p.degree() > 1) {
+    for piece in boundary.iter().map(|b| b.piece).filter(|p| p.degree() > 1) {
         let b = &piece.bounds();
         let (af, mf) = (a.f64(), m.f64());
         let corner = (af * b.min[1]).max(af * b.max[1]) + (mf * b.min[0]).max(mf * b.max[0]);

@@ -130,7 +130,7 @@ impl Combination<'_> {
             return Joined::Tangled;
         };
         let frame = self.frame(parts);
-        let mut pieces: Vec<Arc<Piece>> = Vec::new();
+        let mut pieces: Vec<Piece> = Vec::new();
         let mut owner = Vec::new();
         for (slot, &(_, i)) in self.steps.iter().enumerate() {
             let Some((region, body)) = parts[i].turned() else {
@@ -139,11 +139,12 @@ impl Combination<'_> {
             let Some(Along { k, h, d }) = along(&frame, body.frame()) else {
                 return Joined::Tangled;
             };
-            let mapped = |b: &BoundaryPiece| Arc::new(b.piece.mapped(k, h, d));
+            let mapped = |b: BoundaryPiece| b.piece.mapped(k, h, d);
             pieces.extend(region.boundary().iter().map(mapped));
             owner.resize(pieces.len(), slot);
         }
         let holds = |w: &[Winding]| self.holds(w);
+        let pieces = Arc::new(pieces);
         let outcome = filled_boundary(&pieces, &holds, &|i| owner[i], self.steps.len(), SAME_FACE);
         if outcome.meetings > MOST_MEETINGS {
             return Joined::Tangled;

@@ -30,7 +30,7 @@ use crate::math::bernstein::{self, Coefficients};
 use crate::math::disc::{self, Polygon};
 use crate::math::tetrahedra::HalfSpace;
 use crate::math::{Real, Similarity, quadrature};
-use crate::region::BoundaryPiece;
+use crate::region::{BoundaryPiece, Piece};
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
 
@@ -401,7 +401,7 @@ impl Revolved {
         let near = (cell.flat.length() - shape.half_diagonal()).max(0.0) * (1.0 - 1e-12);
         let mut volume = 0.0;
         self.boundary_near(z + bottom, z + top, near, |part| {
-            let piece = &part.piece;
+            let piece = part.piece;
             let sign = f64::from(part.disc_sign());
             if sign == 0.0 || piece.on_axis {
                 return;
@@ -453,7 +453,7 @@ impl Revolved {
         };
         let mut volume = 0.0;
         self.boundary_near(z + bottom, z + top, near, |part| {
-            let piece = &part.piece;
+            let piece = part.piece;
             let sign = f64::from(part.disc_sign());
             if sign == 0.0 || piece.on_axis {
                 return;
@@ -584,7 +584,7 @@ fn critical_radii(sections: &Sections) -> Vec<f64> {
 
 /// The part of a piece between two heights.
 struct Stretch<'a> {
-    part: &'a BoundaryPiece,
+    part: BoundaryPiece<'a>,
     from: f64,
     to: f64,
 }
@@ -594,8 +594,11 @@ type Cuts = SmallVec<[f64; 16]>;
 type KindCuts = SmallVec<[(f64, bool); 16]>;
 
 impl<'a> Stretch<'a> {
-    fn new(part: &'a BoundaryPiece, low: f64, high: f64) -> Self {
-        let (a, b) = (parameter(part, 1, low), parameter(part, 1, high));
+    fn new(part: BoundaryPiece<'a>, low: f64, high: f64) -> Self {
+        let (a, b) = (
+            parameter(part.piece, 1, low),
+            parameter(part.piece, 1, high),
+        );
         let (from, to) = if part.piece.direction() > 0 {
             (a, b)
         } else {
@@ -606,10 +609,10 @@ impl<'a> Stretch<'a> {
 
     /// The radius and height at a parameter.
     fn point(&self, t: f64) -> [f64; 2] {
-        let piece = &self.part.piece;
+        let piece = self.part.piece;
         if piece.degree() == 1 {
             // As its rows would, which are not made for this.
-            let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
+            let (start, end) = (piece.start().map(Real::f64), piece.end().map(Real::f64));
             return [0, 1].map(|c| start[c] + (end[c] - start[c]) * t);
         }
         let twin = piece.twin();
@@ -621,7 +624,7 @@ impl<'a> Stretch<'a> {
     fn at_radii(&self, radii: &[f64]) -> Cuts {
         let (a, b) = (self.point(self.from)[0], self.point(self.to)[0]);
         let inner = radii.iter().filter(|&&r| r > a.min(b) && r < a.max(b));
-        inner.map(|&r| parameter(self.part, 0, r)).collect()
+        inner.map(|&r| parameter(self.part.piece, 0, r)).collect()
     }
 
     /// Parameters at which the circle touches one of the lines or passes a point in which two meet; `z` is the height of
@@ -755,11 +758,11 @@ impl<'a> Stretch<'a> {
 
     /// area(r(t), z(t)) |z'(t)|.
     fn integrand<'s>(&'s self, area: impl Fn(f64, f64) -> f64 + 's) -> impl Fn(f64) -> f64 + 's {
-        let piece = &self.part.piece;
+        let piece = self.part.piece;
         let twin = piece.twin();
         let ([r, z, w], origin) = (twin.rows(), twin.origin);
         let linear = piece.degree() == 1;
-        let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
+        let (start, end) = (piece.start().map(Real::f64), piece.end().map(Real::f64));
         move |t: f64| {
             if linear {
                 let dz = end[1] - start[1];
@@ -827,9 +830,8 @@ fn sign_changes(c: &[f64], from: f64, to: f64, depth: u32, cuts: &mut Cuts) {
 }
 
 /// The parameter at which coordinate `c` of a piece takes the value `v`, clamped to the piece.
-fn parameter(part: &BoundaryPiece, c: usize, v: f64) -> f64 {
-    let piece = &part.piece;
-    let (start, end) = (piece.start[c].f64(), piece.end[c].f64());
+fn parameter(piece: &Piece, c: usize, v: f64) -> f64 {
+    let (start, end) = (piece.start()[c].f64(), piece.end()[c].f64());
     let rising = end > start;
     if v == start || (v < start) == rising {
         return 0.0;

@@ -133,7 +133,7 @@ fn turned(
         };
         !carried
     };
-    let pieces = other.boundary().iter().map(|b| &*b.piece);
+    let pieces = other.boundary().iter().map(|b| b.piece);
     let swept: Vec<&Piece> = pieces.clone().filter(|p| !p.on_axis).collect();
     let left: Vec<&Piece> = swept.iter().copied().filter(|&p| keeps(p)).collect();
     let mut caps = [false; 2];
@@ -189,8 +189,8 @@ fn carrier(piece: &Piece) -> Option<Carrier> {
             radius: radius.f64(),
         });
     }
-    let at = piece.start.map(Real::f64);
-    let [dr, dz] = [0, 1].map(|c| (piece.end[c] - piece.start[c]).f64());
+    let at = piece.start().map(Real::f64);
+    let [dr, dz] = [0, 1].map(|c| (piece.end()[c] - piece.start()[c]).f64());
     let length = dr.hypot(dz);
     (piece.degree() == 1 && length > 0.0).then(|| Carrier::Line {
         at,
@@ -219,7 +219,7 @@ fn sweep_the_same(
     if !on_axis {
         return false;
     }
-    let mine = &own.boundary()[patch.number].piece;
+    let mine = own.boundary().at(patch.number).piece;
     let points = |of: &Piece, source: &Revolved, target: &Revolved| -> Vec<[f64; 2]> {
         let twin = of.twin();
         let shares = (0..=2 * PROBES).map(|k| f64::from(k) / f64::from(2 * PROBES));

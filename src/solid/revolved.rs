@@ -15,7 +15,9 @@ use super::turn::{Turn, Wedge};
 use crate::math::Side;
 use crate::math::similarity::DdVec;
 use crate::math::{Aabb, Real, Similarity};
-use crate::region::{BoundaryPiece, Box2, DistanceSet, MeridianPoint, Piece, Section};
+use crate::region::{
+    BoundaryPiece, Box2, DistanceSet, FilledPieces, MeridianPoint, Piece, Section,
+};
 use glam::{DVec2, DVec3};
 use std::sync::{Arc, OnceLock};
 
@@ -163,7 +165,7 @@ impl Revolved {
     }
 
     /// The pieces around the turned region, in its unit.
-    pub(crate) fn boundary(&self) -> &[BoundaryPiece] {
+    pub(crate) fn boundary(&self) -> &FilledPieces {
         self.section.boundary()
     }
 
@@ -177,7 +179,7 @@ impl Revolved {
         let flat = self.boundary().iter().filter(|b| b.piece.is_horizontal());
         flat.map(|b| {
             self.frame
-                .to_world(DVec3::new(0.0, 0.0, b.piece.start[1].f64()))[axis]
+                .to_world(DVec3::new(0.0, 0.0, b.piece.start()[1].f64()))[axis]
         })
         .collect()
     }
@@ -266,7 +268,7 @@ impl Revolved {
         self.section.boundary_tree().visit(
             |b| b.overlaps(&wanted),
             |i| {
-                let piece = &self.boundary()[i as usize].piece;
+                let piece = self.boundary().at(i as usize).piece;
                 found |= !piece.on_axis && piece.bounds().overlaps(&wanted);
             },
         );
@@ -321,16 +323,16 @@ impl Revolved {
 
     /// Calls `each` with the boundary pieces that reach heights between `low` and `high` at a
     /// radius of at least `near`.
-    pub(crate) fn boundary_near(
-        &self,
+    pub(crate) fn boundary_near<'a>(
+        &'a self,
         low: f64,
         high: f64,
         near: f64,
-        mut each: impl FnMut(&BoundaryPiece),
+        mut each: impl FnMut(BoundaryPiece<'a>),
     ) {
         let wanted = |b: &Box2| b.max[1] >= low && b.min[1] <= high && b.max[0] >= near;
         self.section.boundary_tree().visit(wanted, |i| {
-            let part = &self.boundary()[i as usize];
+            let part = self.boundary().at(i as usize);
             if wanted(&part.piece.bounds()) {
                 each(part);
             }
@@ -345,7 +347,7 @@ fn surface_pieces(section: &Section) -> impl Iterator<Item = &Piece> {
 
 /// The pieces around a cap.
 fn edge_pieces(section: &Section) -> impl Iterator<Item = &Piece> {
-    section.boundary().iter().map(|b| &*b.piece)
+    section.boundary().iter().map(|b| b.piece)
 }
 
 /// Distance to a box so far away that its size is below the rounding of the distance.

@@ -16,7 +16,6 @@ use super::turn::Turn;
 use crate::math::{Dd, Real, Side, Similarity};
 use crate::region::{BoxTree, MeridianPoint, Piece, Section};
 use glam::{DVec2, DVec3};
-use std::sync::Arc;
 
 /// A row of `count` voxel centres from `first`, `step` apart along x, in scene units.
 #[derive(Debug, Clone, Copy)]
@@ -119,7 +118,7 @@ pub(crate) struct RowSurface<'a> {
     pub(crate) frame: &'a Similarity,
     pub(crate) turn: &'a Turn,
     pub(crate) section: &'a Section,
-    pub(crate) pieces: &'a [Arc<Piece>],
+    pub(crate) pieces: &'a [Piece],
     pub(crate) tree: &'a BoxTree,
 }
 
@@ -175,15 +174,15 @@ impl RowSurface<'_> {
                 {
                     return;
                 }
-                for end in [piece.start, piece.end] {
+                for end in [piece.start(), piece.end()] {
                     if (end[1] - z).f64().abs() <= margin {
                         radii.push(around(end[0]));
                     }
                 }
                 let (low, high) = if piece.direction() > 0 {
-                    (piece.start[1], piece.end[1])
+                    (piece.start()[1], piece.end()[1])
                 } else {
-                    (piece.end[1], piece.start[1])
+                    (piece.end()[1], piece.start()[1])
                 };
                 if z > low && z < high {
                     // Straight pieces are as quick in double-double.
@@ -287,9 +286,9 @@ fn search_piece(piece: &Piece, local: &LocalRow, range: [f64; 2], cuts: &mut Cut
     let mut work = smallvec::SmallVec::<[(f64, [f64; 2], f64, [f64; 2], u32); 32]>::new();
     work.push((
         0.0,
-        piece.start.map(Real::f64),
+        piece.start().map(Real::f64),
         1.0,
-        piece.end.map(Real::f64),
+        piece.end().map(Real::f64),
         0,
     ));
     let margin = twin.error + 4.0 * f64::EPSILON;

@@ -28,7 +28,7 @@ impl Revolved {
 
     /// A ball around the part of a patch between two parameters of its piece and two shares of its lines.
     pub(super) fn cover(&self, patch: Patch, t: [f64; 2], s: [f64; 2]) -> Cover {
-        let twin = self.boundary()[patch.number].piece.twin();
+        let twin = self.boundary().at(patch.number).piece.twin();
         // Neither coordinate turns within a piece.
         let [a, b] = t.map(|t| {
             let p = twin.at(t);
@@ -68,7 +68,7 @@ impl Revolved {
 
     /// Length of the piece per unit of its parameter, in scene units.
     pub(super) fn pace(&self, patch: Patch, t: f64) -> f64 {
-        let [dr, dz] = self.boundary()[patch.number].piece.twin().slope(t);
+        let [dr, dz] = self.boundary().at(patch.number).piece.twin().slope(t);
         dr.hypot(dz) * self.frame().scale()
     }
 
@@ -84,7 +84,7 @@ impl Revolved {
 
     /// The circle or the segment of a patch at parameter `t` of its piece.
     pub(super) fn rule(&self, patch: Patch, t: f64, hair: f64) -> Option<Rule> {
-        let part = &self.boundary()[patch.number];
+        let part = self.boundary().at(patch.number);
         let twin = part.piece.twin();
         let at = twin.at(t);
         let (r, z) = (at[0] + twin.origin[0], at[1] + twin.origin[1]);

@@ -26,7 +26,7 @@ use super::turn::Turn;
 use crate::math::quadrature::Integral;
 use crate::math::similarity::DdVec;
 use crate::math::{Dd, Real, Similarity};
-use crate::region::{BoundaryPiece, Estimate, SectionMoments};
+use crate::region::{Estimate, FilledPieces, SectionMoments};
 use glam::DVec3;
 
 /// Rounding of the double-double sums here, relative to the size of their terms: a few tens of units.
@@ -72,7 +72,7 @@ impl Part {
 }
 
 /// Moments of the region that `boundary` bounds, turned about the third axis of `frame`.
-fn moments(frame: &Similarity, turn: &Turn, boundary: &[BoundaryPiece]) -> Moments {
+fn moments(frame: &Similarity, turn: &Turn, boundary: &FilledPieces) -> Moments {
     let section = SectionMoments::new(boundary);
     let ring = Ring::new(&section, turn).at_centroid();
     ring.with_decimals().placed(frame, turn)

@@ -223,8 +223,8 @@ impl Job<'_> {
         let bodies = self.scene.assembly().bodies().iter();
         let pieces = bodies
             .filter_map(|b| Body::revolved(b))
-            .flat_map(|b| b.boundary());
-        let list = |b: &BoundaryPiece, c: usize| b.piece.points().map(|p| p[c].f64()).collect();
+            .flat_map(|b| b.boundary().iter());
+        let list = |b: BoundaryPiece, c: usize| b.piece.points().map(|p| p[c].f64()).collect();
         pieces.map(|b| [0, 1, 2].map(|c| list(b, c))).collect()
     }
 }

@@ -169,7 +169,7 @@ impl StackDirectory {
         if !lock(&self.names).insert(name.into()) {
             return Err(IoError::WrittenTwice { path });
         }
-        let file = self.stage(name, bytes)?;
+        let file = self.stage(name, |file| file.write_all(bytes))?;
         (self.syncer.sync(name, file)).map_err(|failure| self.not_synced(failure))?;
         Ok(WrittenFile {
             bytes: bytes.len() as u64,
@@ -182,14 +182,18 @@ impl StackDirectory {
     }
 
     /// Writes a file into the staging directory; the caller syncs it.
-    fn stage(&self, name: &str, bytes: &[u8]) -> Result<File, IoError> {
+    fn stage(
+        &self,
+        name: &str,
+        content: impl FnOnce(&mut File) -> io::Result<()>,
+    ) -> Result<File, IoError> {
         let staged = new_place(&self.staging_path()).join(name);
         let write = || {
             let mut file = {
                 let _begun = ending::begin()?;
                 File::create_new(&staged)?
             };
-            file.write_all(bytes)?;
+            content(&mut file)?;
             Ok(file)
         };
         write().map_err(|source| {
@@ -212,7 +216,15 @@ impl StackDirectory {
     /// is to be replaced has changed, [`IoError::Write`] when the system refuses. Either way no new file stays.
     /// [`IoError::Unsettled`] when what was begun can neither be finished nor undone: nothing is removed, and the next
     /// run settles it.
-    pub fn commit(mut self, manifest: &[u8]) -> Result<(), IoError> {
+    pub fn commit(self, manifest: &[u8]) -> Result<(), IoError> {
+        self.commit_written(|file| file.write_all(manifest))
+    }
+
+    /// As [`commit`](Self::commit), with a manifest that is written piece by piece.
+    pub(super) fn commit_written(
+        mut self,
+        manifest: impl FnOnce(&mut File) -> io::Result<()>,
+    ) -> Result<(), IoError> {
         let file = self.stage(MANIFEST_NAME, manifest)?;
         file.sync_all()
             .map_err(IoError::write(self.path.join(MANIFEST_NAME)))?;

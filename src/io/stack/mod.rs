@@ -35,7 +35,7 @@ use super::exr::{
 };
 use super::manifest::{
     ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, MaterialVolume,
-    SCHEMA, slice_name,
+    SCHEMA, WriteScene, slice_name,
 };
 use crate::grid::GridSpec;
 
@@ -133,6 +133,23 @@ pub struct StackSummary {
     pub certainty: serde_json::Value,
     /// The resolved scene.
     pub scene: serde_json::Value,
+}
+
+/// What a stack takes on its disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expected {
+    /// Bytes of the layers that are written.
+    pub present: u64,
+    /// Bytes that the others and the manifest are expected to take.
+    pub rest: u64,
+}
+
+impl Expected {
+    /// Bytes of the whole.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.present.saturating_add(self.rest)
+    }
 }
 
 /// A stack while it is being written.
@@ -292,6 +309,28 @@ impl StackWriter {
         Ok(samples)
     }
 
+    /// Bytes that the whole stack will take, judging by the layers that are written: one that is not is taken to be as
+    /// large as the two written ones about it are on average. With what these take already; `None` where there is none.
+    #[must_use]
+    pub fn expected_bytes(&self) -> Option<Expected> {
+        let written = self.written();
+        let mut sizes = written.layers.iter().map(|(&k, (file, _))| (k, file.bytes));
+        let mut before = sizes.next()?;
+        let present: u64 = written.layers.values().map(|(file, _)| file.bytes).sum();
+        let mut between = before.0 as u64 * before.1;
+        for (k, bytes) in sizes {
+            let missing = (k - before.0 - 1) as u64;
+            between = between.saturating_add(missing * (before.1 + bytes) / 2);
+            before = (k, bytes);
+        }
+        let layers = self.grid.dims()[2];
+        let after = (layers - 1 - before.0) as u64 * before.1;
+        let rest = (between.saturating_add(after))
+            .saturating_add(RECORD.saturating_mul(layers as u64))
+            .saturating_add(MANIFEST);
+        Some(Expected { present, rest })
+    }
+
     /// Writes a file beside the slices; the manifest lists it too.
     ///
     /// # Errors
@@ -309,6 +348,31 @@ impl StackWriter {
     /// [`IoError::LayerMissing`] when a layer was not written, [`IoError::Mismatch`] when a number
     /// in `summary` is not finite, and as [`StackDirectory::commit`].
     pub fn finish(self, summary: StackSummary) -> Result<Manifest, IoError> {
+        self.finish_with(summary, None)
+    }
+
+    /// As [`finish`](Self::finish), with the resolved scene as `scene` writes it instead of the summary's: the manifest
+    /// that is returned has none.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_with_scene(
+        self,
+        summary: StackSummary,
+        scene: &WriteScene<'_>,
+    ) -> Result<Manifest, IoError> {
+        let summary = StackSummary {
+            scene: serde_json::Value::Null,
+            ..summary
+        };
+        self.finish_with(summary, Some(scene))
+    }
+
+    fn finish_with(
+        self,
+        summary: StackSummary,
+        scene: Option<&WriteScene<'_>>,
+    ) -> Result<Manifest, IoError> {
         let path = self.directory.path().to_path_buf();
         let written = self
             .written
@@ -393,11 +457,20 @@ impl StackWriter {
             certainty: summary.certainty,
             scene: summary.scene,
         };
-        let bytes = manifest.to_bytes().map_err(|reason| IoError::Mismatch {
+        let mismatch = |reason| IoError::Mismatch {
             path: path.join(MANIFEST_NAME),
             reason,
-        })?;
-        self.directory.commit(&bytes)?;
+        };
+        match scene {
+            None => {
+                let bytes = manifest.to_bytes().map_err(mismatch)?;
+                self.directory.commit(&bytes)?;
+            }
+            Some(scene) => {
+                let write = manifest.written_with(scene).map_err(mismatch)?;
+                self.directory.commit_written(write)?;
+            }
+        }
         Ok(manifest)
     }
 

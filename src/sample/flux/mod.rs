@@ -326,9 +326,9 @@ impl FluxSampler {
         };
         let mut pieces = Vec::new();
         body.boundary_near(wanted.heights[0], wanted.heights[1], 0.0, |p| {
-            pieces.push(p.clone());
+            pieces.push(p);
         });
-        Table::new(pieces.iter(), wanted)
+        Table::new(pieces.into_iter(), wanted)
     }
 
     /// Fills layer `k` of the grid, x fastest; `None` where a table cannot be had, or `cancel` says so, and nothing is

@@ -28,7 +28,7 @@ pub(super) struct Curve {
 
 impl Curve {
     pub(super) fn new(part: &BoundaryPiece) -> Self {
-        let piece = &part.piece;
+        let piece = part.piece;
         let twin = piece.twin();
         let [r, z, w] = twin.rows().map(|row| Coefficients::from_slice(&row));
         Self {
@@ -132,12 +132,12 @@ pub(super) struct Part {
 impl Part {
     /// What a layer between two heights has of a piece that is not horizontal; `None` where it has nothing.
     pub(super) fn new(part: &BoundaryPiece, low: f64, high: f64) -> Option<Self> {
-        let piece = &part.piece;
+        let piece = part.piece;
         let sign = f64::from(part.disc_sign());
         if sign == 0.0 || piece.on_axis {
             return None;
         }
-        let (start, end) = (piece.start.map(Real::f64), piece.end.map(Real::f64));
+        let (start, end) = (piece.start().map(Real::f64), piece.end().map(Real::f64));
         let curve = Curve::new(part);
         // Parameter, radius and height where the piece enters the layer or leaves it.
         let clipped = |t: f64, own: [f64; 2]| {

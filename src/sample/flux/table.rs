@@ -95,11 +95,11 @@ struct Builder<'a> {
 impl Table {
     /// The table of a layer; `None` where its pieces are too many for it or its errors too large.
     pub(super) fn new<'p>(
-        pieces: impl Iterator<Item = &'p BoundaryPiece>,
+        pieces: impl Iterator<Item = BoundaryPiece<'p>>,
         wanted: Wanted,
     ) -> Option<Self> {
         let [low, high] = wanted.heights;
-        let pieces: Vec<&BoundaryPiece> = pieces.collect();
+        let pieces: Vec<BoundaryPiece<'p>> = pieces.collect();
         if !pieces.iter().all(|p| is_tame(p)) {
             return None;
         }

@@ -107,15 +107,14 @@ impl Cell {
     /// The share of the voxel, by the radius.
     fn share(&self, pieces: &[BoundaryPiece], caps: Option<&Caps>) -> f64 {
         let [low, high] = self.z;
-        let parts: Vec<&BoundaryPiece> = pieces
-            .iter()
+        let parts: Vec<BoundaryPiece> = (pieces.iter().copied())
             .filter(|p| p.disc_sign() != 0 && !p.piece.on_axis)
             .filter(|p| p.piece.bounds().max[1] > low && p.piece.bounds().min[1] < high)
             .collect();
         let mut radii = self.radii(caps);
         for part in &parts {
-            let piece = &part.piece;
-            for end in [piece.start, piece.end] {
+            let piece = part.piece;
+            for end in [piece.start(), piece.end()] {
                 radii.push(end[0].f64());
             }
             if piece.degree() > 1 {
@@ -124,7 +123,7 @@ impl Cell {
                 radii.extend(inner.map(|p| p[0].f64()));
             }
             for z in self.z {
-                let (a, b) = (piece.start[1].f64(), piece.end[1].f64());
+                let (a, b) = (piece.start()[1].f64(), piece.end()[1].f64());
                 if z > a.min(b) && z < a.max(b) {
                     radii.push(piece.other_at(1, Dd::of(z)).f64());
                 }
@@ -141,11 +140,11 @@ impl Cell {
         radii.sort_by(f64::total_cmp);
         let height = |r: f64| -> f64 {
             let each = parts.iter().map(|part| {
-                let piece = &part.piece;
-                let (inner, outer) = if piece.start[0] <= piece.end[0] {
-                    (piece.start, piece.end)
+                let piece = part.piece;
+                let (inner, outer) = if piece.start()[0] <= piece.end()[0] {
+                    (piece.start(), piece.end())
                 } else {
-                    (piece.end, piece.start)
+                    (piece.end(), piece.start())
                 };
                 let from = if r <= inner[0].f64() {
                     inner[1]
@@ -340,7 +339,8 @@ fn compare(name: &str, text: &str, error: f64, count: usize) -> f64 {
                 v: [q.at[index[v]], q.at[index[v] + 1]],
                 z: [heights[0].min(heights[1]), heights[0].max(heights[1])],
             };
-            let wanted = cell.share(body.boundary(), sampler.caps.as_ref());
+            let boundary: Vec<_> = body.boundary().iter().collect();
+            let wanted = cell.share(&boundary, sampler.caps.as_ref());
             let off = (found - wanted).abs();
             if off > worst.0 {
                 worst = (off, *index);

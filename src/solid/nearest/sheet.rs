@@ -208,7 +208,7 @@ fn revolved(index: usize, body: &Arc<Body>, one: &Revolved, out: &mut Vec<Sheet>
         });
     }
     let corners = || {
-        let ends = (one.boundary().iter()).flat_map(|b| [b.piece.start, b.piece.end]);
+        let ends = (one.boundary().iter()).flat_map(|b| [b.piece.start(), b.piece.end()]);
         ends.map(|p| vec2(p.map(Real::f64)) * scale)
     };
     let low = corners().fold(DVec2::INFINITY, DVec2::min);
@@ -240,9 +240,10 @@ fn ring_box(place: &Place, piece: &Piece, scale: f64) -> Aabb {
 
 impl Profile {
     fn new(piece: &Piece, scale: f64) -> Self {
-        let [start, end] = [piece.start, piece.end].map(|p| vec2(p.map(Real::f64)) * scale);
+        let [start, end] = [piece.start(), piece.end()].map(|p| vec2(p.map(Real::f64)) * scale);
         if piece.degree() == 1 {
-            let along = DVec2::from_array([0, 1].map(|c| (piece.end[c] - piece.start[c]).f64()));
+            let along =
+                DVec2::from_array([0, 1].map(|c| (piece.end()[c] - piece.start()[c]).f64()));
             return Self::Line {
                 start,
                 along: along.normalize_or_zero(),
