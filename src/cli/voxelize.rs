@@ -17,7 +17,7 @@ use crate::io::stack::{
 use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{
-    Certainty, Channel, FRACTION_PROMISE, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
+    Certainty, Channel, FRACTION_ERROR, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
 };
 use crate::scene::{
     ChannelModel, ChannelName, CompressionName, FormatName, PARAMETERS, Scene, nearest,
@@ -110,17 +110,17 @@ pub(super) fn run(
     let Ways {
         flux,
         sections,
+        crossed,
         divided,
     } = tally.ways;
     tracing::debug!(
         flux,
         sections,
+        crossed,
         divided,
         "voxels whose fractions were integrated"
     );
-    if let Some(warning) = said_of_fractions(&tally) {
-        console.warn(&warning);
-    }
+    within_error(&tally, plan.selection.fraction_error)?;
     let drawn = Instant::now();
     if arguments.preview {
         preview(&scene, &plan, &writer)?;
@@ -553,23 +553,27 @@ fn said_of_volume(scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// What is to be said of fractions that are not as near as is promised.
-fn said_of_fractions(tally: &Tally) -> Option<String> {
+/// Refuses fractions that are not as near as is asked, naming what can be had.
+fn within_error(tally: &Tally, asked: Option<f64>) -> Result<(), Failure> {
     let Loose { voxels, bound } = tally.loose;
-    (voxels > 0).then(|| {
-        format!(
-            "fraction: {voxels} voxels are known to within {bound:.1e} only, not {FRACTION_PROMISE:e}: surfaces touch their \
-             sides, or nearly coincide in them; a grid that is moved a little may do better"
-        )
-    })
+    if voxels == 0 {
+        return Ok(());
+    }
+    let asked = asked.unwrap_or(FRACTION_ERROR);
+    // Rounded up, so that it can be had as it is written.
+    let unit = 10_f64.powf(bound.log10().floor() - 1.0);
+    let bound = (bound / unit * (1.0 - 1e-9)).ceil() * unit;
+    Err(Failure::usage(format!(
+        "fraction: {voxels} voxels are known to within {bound:.1e} only, not {asked:e}; take --fraction-error {bound:.1e}, \
+         or a grid that is moved a little, where surfaces touch sides of voxels"
+    )))
 }
 
-fn warnings(scene: &Scene, plan: &Plan, tally: Option<&Tally>) -> Vec<String> {
+fn warnings(scene: &Scene, plan: &Plan) -> Vec<String> {
     let volume = said_of_volume(scene).map(str::to_owned);
     let said = scene.warnings().iter().cloned();
     said.chain(scene.grid_warning(&plan.grid))
         .chain(volume)
-        .chain(tally.and_then(said_of_fractions))
         .collect()
 }
 
@@ -651,7 +655,7 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         volume_exact_error: scene.volume_beside_sampling().map(|v| v.error),
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
-        warnings: warnings(scene, plan, Some(tally)),
+        warnings: warnings(scene, plan),
         material_volumes: material_volumes(scene, plan, tally),
         certainty: if plan.selection.sdf {
             certainty(&tally.certainty)
@@ -692,7 +696,7 @@ fn document(
         "volume_exact_error": scene.volume_beside_sampling().map(|v| v.error),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": memory::peak(),
-        "warnings": warnings(scene, plan, tally),
+        "warnings": warnings(scene, plan),
     })
 }
 
