@@ -275,9 +275,9 @@ impl Case {
         }
         cuts.retain(|t| (0.0..=1.0).contains(t));
         cuts.sort_by(f64::total_cmp);
-        let inside = cuts.windows(2).filter(|w| {
-            w[1] > w[0] && self.contains(p + d * (0.5 * (w[0] + w[1])))
-        });
+        let inside = cuts
+            .windows(2)
+            .filter(|w| w[1] > w[0] && self.contains(p + d * (0.5 * (w[0] + w[1]))));
         inside.map(|w| w[1] - w[0]).sum()
     }
 
@@ -304,17 +304,17 @@ impl Case {
             let size = bounds.longest_side() * 10_f64.powf(random.between(-2.0, -0.5));
             let sides = DVec3::from_array([0; 3].map(|_| size * random.between(0.7, 1.3)));
             let at = |i: usize, random: &mut Random| {
-                random.between(bounds.min[i] - 0.5 * sides[i], bounds.max[i] - 0.5 * sides[i])
+                random.between(
+                    bounds.min[i] - 0.5 * sides[i],
+                    bounds.max[i] - 0.5 * sides[i],
+                )
             };
             let low = DVec3::new(at(0, random), at(1, random), at(2, random));
             let crossing = self.solids.iter().filter(|s| {
                 let mut seen = [false; 2];
                 for n in 0..27 {
-                    let share = DVec3::new(
-                        (n % 3) as f64,
-                        (n / 3 % 3) as f64,
-                        (n / 9) as f64,
-                    ) * 0.5;
+                    let share =
+                        DVec3::new((n % 3) as f64, (n / 3 % 3) as f64, (n / 9) as f64) * 0.5;
                     seen[usize::from(s.contains(low + sides * share))] = true;
                 }
                 seen == [true; 2]
@@ -352,7 +352,14 @@ fn gauss(f: &impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
 /// The integral over [0, 1], halved where halves differ from the whole; the first parts are uneven, so that no symmetry
 /// hides anything.
 fn integral(f: &impl Fn(f64) -> f64, tolerance: f64) -> f64 {
-    fn halved(f: &impl Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, depth: u32) -> f64 {
+    fn halved(
+        f: &impl Fn(f64) -> f64,
+        a: f64,
+        b: f64,
+        whole: f64,
+        tolerance: f64,
+        depth: u32,
+    ) -> f64 {
         let m = 0.5 * (a + b);
         let (left, right) = (gauss(f, a, m), gauss(f, m, b));
         if (left + right - whole).abs() <= tolerance * (b - a).sqrt() || depth == 0 {
@@ -378,15 +385,24 @@ fn cases() -> Vec<Case> {
             "steinmetz",
             vec![
                 solid(Cylinder(1.0, 3.0)).at(0.0, 0.0, -1.5),
-                solid(Cylinder(1.0, 3.0)).rotated(y, 90.0).at(-1.5, 0.0, 0.0).common(),
+                solid(Cylinder(1.0, 3.0))
+                    .rotated(y, 90.0)
+                    .at(-1.5, 0.0, 0.0)
+                    .common(),
             ],
         ),
         Case::new(
             "three bars",
             vec![
                 solid(Cylinder(1.0, 3.0)).at(0.0, 0.0, -1.5),
-                solid(Cylinder(1.0, 3.0)).rotated(y, 90.0).at(-1.5, 0.0, 0.0).common(),
-                solid(Cylinder(1.0, 3.0)).rotated(x, 90.0).at(0.0, 1.5, 0.0).common(),
+                solid(Cylinder(1.0, 3.0))
+                    .rotated(y, 90.0)
+                    .at(-1.5, 0.0, 0.0)
+                    .common(),
+                solid(Cylinder(1.0, 3.0))
+                    .rotated(x, 90.0)
+                    .at(0.0, 1.5, 0.0)
+                    .common(),
             ],
         ),
         Case::new(
@@ -395,7 +411,10 @@ fn cases() -> Vec<Case> {
                 solid(Cylinder(4.0, 0.5)),
                 solid(Cylinder(0.375, 0.5)).at(3.0, 0.25, 0.0).cut(),
                 solid(Cylinder(1.0, 1.0)).at(0.5, 0.25, 0.5),
-                solid(Cylinder(0.25, 4.0)).rotated([1.0, 2.0, 0.5], 40.0).at(0.5, 0.5, -0.5).cut(),
+                solid(Cylinder(0.25, 4.0))
+                    .rotated([1.0, 2.0, 0.5], 40.0)
+                    .at(0.5, 0.5, -0.5)
+                    .cut(),
             ],
         ),
         Case::new(
@@ -411,8 +430,13 @@ fn cases() -> Vec<Case> {
             "slanted rings",
             vec![
                 solid(Torus(2.0, 0.75)),
-                solid(Torus(2.0, 0.5)).rotated([1.0, 0.5, 0.0], 50.0).at(0.5, 0.25, 0.125),
-                solid(Cone(1.5, 0.25, 3.0)).rotated([0.0, 1.0, 1.0], 70.0).at(0.0, 0.25, 0.0).cut(),
+                solid(Torus(2.0, 0.5))
+                    .rotated([1.0, 0.5, 0.0], 50.0)
+                    .at(0.5, 0.25, 0.125),
+                solid(Cone(1.5, 0.25, 3.0))
+                    .rotated([0.0, 1.0, 1.0], 70.0)
+                    .at(0.0, 0.25, 0.0)
+                    .cut(),
             ],
         ),
         Case::new(
@@ -420,7 +444,9 @@ fn cases() -> Vec<Case> {
             vec![
                 solid(Cone(2.0, 0.0, 3.0)),
                 solid(Cone(1.0, 0.5, 2.0)).at(0.5, 0.5, 0.0).cut(),
-                solid(Cone(2.0, 0.0, 3.0)).rotated(y, 90.0).at(-1.0, 0.0, 0.5),
+                solid(Cone(2.0, 0.0, 3.0))
+                    .rotated(y, 90.0)
+                    .at(-1.0, 0.0, 0.5),
             ],
         ),
         Case::new(
@@ -435,8 +461,14 @@ fn cases() -> Vec<Case> {
             "a slanted block in an ellipsoid",
             vec![
                 solid(Block([4.0, 2.0, 1.5])).rotated([1.0, 2.0, 3.0], 50.0),
-                solid(Ellipsoid([1.5, 1.25, 1.0])).rotated([3.0, -1.0, 1.0], 30.0).at(0.5, 0.25, 0.25).common(),
-                solid(Cylinder(0.5, 4.0)).rotated([1.0, 1.0, 0.0], 30.0).at(0.0, 0.0, -2.0).cut(),
+                solid(Ellipsoid([1.5, 1.25, 1.0]))
+                    .rotated([3.0, -1.0, 1.0], 30.0)
+                    .at(0.5, 0.25, 0.25)
+                    .common(),
+                solid(Cylinder(0.5, 4.0))
+                    .rotated([1.0, 1.0, 0.0], 30.0)
+                    .at(0.0, 0.0, -2.0)
+                    .cut(),
             ],
         ),
         Case::new(
@@ -444,7 +476,11 @@ fn cases() -> Vec<Case> {
             vec![
                 solid(Cylinder(2.0, 2.0)).turned(0.0, 200.0),
                 solid(Torus(1.5, 0.5)).turned(30.0, 100.0).at(0.0, 0.0, 2.0),
-                solid(Sphere(1.0)).turned(45.0, 270.0).rotated(x, 90.0).at(0.5, 0.75, 0.25).cut(),
+                solid(Sphere(1.0))
+                    .turned(45.0, 270.0)
+                    .rotated(x, 90.0)
+                    .at(0.5, 0.75, 0.25)
+                    .cut(),
             ],
         ),
     ]

@@ -145,7 +145,7 @@ pub(super) fn run(
         total: start.elapsed().as_secs_f64(),
     };
     console.result(
-        &document(&scene, &plan, Some(&manifest), Some(&tally), Some(&seconds)),
+        &document(&scene, &plan, Some(&manifest), Some(&seconds)),
         &report(&scene, arguments, &manifest, &seconds),
     )?;
     Ok(ExitCode::SUCCESS)
@@ -671,7 +671,6 @@ fn document(
     scene: &Scene,
     plan: &Plan,
     manifest: Option<&Manifest>,
-    tally: Option<&Tally>,
     seconds: Option<&Seconds>,
 ) -> Value {
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
@@ -724,7 +723,7 @@ fn dry_run(
         output::bytes(plan.memory_bytes()),
         plan.workers,
     );
-    console.result(&document(scene, plan, None, None, Some(&seconds)), &text)?;
+    console.result(&document(scene, plan, None, Some(&seconds)), &text)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -274,7 +274,11 @@ impl Revolved {
     }
 
     /// Calls `each` with the pieces that sweep the surface whose boxes meet a box of the half-plane, in the body's unit.
-    pub(super) fn boundary_within<'a>(&'a self, wanted: &Box2, mut each: impl FnMut(&'a BoundaryPiece)) {
+    pub(super) fn boundary_within<'a>(
+        &'a self,
+        wanted: &Box2,
+        mut each: impl FnMut(&'a BoundaryPiece),
+    ) {
         self.section.boundary_tree().visit(
             |b| b.overlaps(wanted),
             |i| {

@@ -77,8 +77,8 @@ struct Part<'a> {
     affine: Affine,
     aligned: Option<Aligned>,
     surfaces: Vec<Surface<'a>>,
-    /// Ends of pieces, (r, z).
-    rims: Vec<[f64; 2]>,
+    /// Ends of pieces, (r, z), and whether a bent piece may end there normal or parallel to the axis.
+    rims: Vec<([f64; 2], bool)>,
     /// Heights and radii of spheres about points of the axis.
     spheres: Vec<[f64; 2]>,
     /// Places along the three directions where the body may begin or end.
@@ -101,7 +101,10 @@ pub(crate) struct Crossed<'a> {
     parts: Vec<Part<'a>>,
     solids: Vec<Whole<'a>>,
     terms: Vec<Masks>,
+    /// Places of a row nearer to each other than this are one.
     tiny: f64,
+    /// What places are rounded to.
+    rounding: f64,
     rows: Cell<u64>,
 }
 
@@ -133,6 +136,7 @@ impl<'a> Crossed<'a> {
             solids: Vec::new(),
             terms: Vec::new(),
             tiny: TINY,
+            rounding: 16.0 * f64::EPSILON,
             rows: Cell::new(0),
         };
         let mut labels = BRANCHES;
@@ -159,6 +163,7 @@ impl<'a> Crossed<'a> {
             let size = part.affine.m.iter().map(|m| m.length());
             let least = size.fold(f64::INFINITY, f64::min);
             let far = part.affine.o.abs().max_element();
+            made.rounding = made.rounding.max(16.0 * f64::EPSILON * far / least);
             made.tiny = made.tiny.max(64.0 * f64::EPSILON * far / least);
         }
         Some(made)
@@ -190,9 +195,7 @@ impl<'a> Crossed<'a> {
             Body::Ellipsoid(ball) => {
                 let radii = ball.local_radii();
                 let forms = [0, 1, 2].map(|c| affine.form(c).scaled(1.0 / radii[c], 0.0));
-                let mut quadric = forms
-                    .iter()
-                    .fold(Quadric::default(), |q, f| q.plus(f, 1.0));
+                let mut quadric = forms.iter().fold(Quadric::default(), |q, f| q.plus(f, 1.0));
                 quadric.constant -= 1.0;
                 let solid = self.solid(Whole::Ball(quadric));
                 part.all |= 1 << solid;
@@ -212,7 +215,13 @@ impl<'a> Crossed<'a> {
                     }
                 }
                 for corner in 0..8 {
-                    let side = |c: usize| if corner >> c & 1 == 1 { half[c] } else { -half[c] };
+                    let side = |c: usize| {
+                        if corner >> c & 1 == 1 {
+                            half[c]
+                        } else {
+                            -half[c]
+                        }
+                    };
                     let corner = DVec3::new(side(0), side(1), side(2));
                     part.bounds.push([0, 1, 2].map(|k| affine.place(k, corner)));
                 }
@@ -228,7 +237,10 @@ impl<'a> Crossed<'a> {
 
     fn solid(&mut self, whole: Whole<'a>) -> u16 {
         self.solids.push(whole);
-        #[allow(clippy::cast_possible_truncation, reason = "at most MOST are looked at")]
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "at most MOST are looked at"
+        )]
         {
             (self.solids.len() - 1) as u16
         }
@@ -253,7 +265,12 @@ impl<'a> Crossed<'a> {
         Some(solid)
     }
 
-    fn add_turned(&mut self, body: &'a Revolved, part: &mut Part<'a>, labels: &mut u32) -> Option<()> {
+    fn add_turned(
+        &mut self,
+        body: &'a Revolved,
+        part: &mut Part<'a>,
+        labels: &mut u32,
+    ) -> Option<()> {
         let affine = part.affine;
         if self.solids.len() >= MOST {
             return None;
@@ -262,15 +279,20 @@ impl<'a> Crossed<'a> {
         part.all |= 1 << solid;
         let [x, y, z] = [0, 1, 2].map(|c| affine.form(c));
         body.boundary_within(&within(&affine), |piece| {
-            let ends = [piece.piece.start.map(Real::f64), piece.piece.end.map(Real::f64)];
+            let ends = [
+                piece.piece.start.map(Real::f64),
+                piece.piece.end.map(Real::f64),
+            ];
             let ([r0, z0], [r1, z1]) = (ends[0], ends[1]);
             let stretch = Stretch::new(ends, z);
             let inside_below = piece.disc_sign() > 0;
             // The solid lies left of the way.
             let inside_above = piece.forward == (r1 > r0);
+            let bent = piece.piece.degree() > 1;
             for rim in ends {
-                if !part.rims.contains(&rim) {
-                    part.rims.push(rim);
+                match part.rims.iter_mut().find(|r| r.0 == rim) {
+                    Some(known) => known.1 |= bent,
+                    None => part.rims.push((rim, bent)),
                 }
             }
             let circle = piece.piece.circle();
@@ -279,7 +301,8 @@ impl<'a> Crossed<'a> {
                     form: z.scaled(1.0, -z0),
                     radii: Some([r0.min(r1), r0.max(r1)]),
                 };
-                part.surfaces.push(surface(sheet, !inside_above, solid, labels));
+                part.surfaces
+                    .push(surface(sheet, !inside_above, solid, labels));
             } else if piece.piece.degree() == 1 {
                 let (dr, dz) = (r1 - r0, z1 - z0);
                 let square = dr * dr + dz * dz;
@@ -290,7 +313,8 @@ impl<'a> Crossed<'a> {
                     .plus(&y, share)
                     .plus(&radius, -1.0 / square);
                 let sheet = Sheet::Cone { quadric, stretch };
-                part.surfaces.push(surface(sheet, inside_below, solid, labels));
+                part.surfaces
+                    .push(surface(sheet, inside_below, solid, labels));
             } else if let Some((centre, radius)) = circle
                 && centre[0].f64() == 0.0
             {
@@ -301,7 +325,8 @@ impl<'a> Crossed<'a> {
                     .plus(&z.scaled(1.0, -height), 1.0);
                 quadric.constant -= radius * radius;
                 let sheet = Sheet::Sphere { quadric, stretch };
-                part.surfaces.push(surface(sheet, inside_below, solid, labels));
+                part.surfaces
+                    .push(surface(sheet, inside_below, solid, labels));
                 if !part.spheres.contains(&[height, radius]) {
                     part.spheres.push([height, radius]);
                 }
@@ -317,10 +342,7 @@ impl<'a> Crossed<'a> {
         if let Turn::Partial(wedge) = body.turn() {
             let [s, e] = wedge.directions();
             // Negative left of the start, and right of the end.
-            let forms = [
-                [s.y, -s.x],
-                [-e.y, e.x],
-            ];
+            let forms = [[s.y, -s.x], [-e.y, e.x]];
             for [a, b] in forms {
                 let form = Form {
                     slope: [0, 1, 2].map(|k| a * x.slope[k] + b * y.slope[k]),
@@ -492,6 +514,14 @@ impl<'a> Crossed<'a> {
             for bound in &part.bounds {
                 places.push((bound[k], true));
             }
+            if part.aligned.is_some() {
+                continue;
+            }
+            for surface in &part.surfaces {
+                if let Sheet::Bent(bend) = &surface.sheet {
+                    places::reach_of_bend(&part.affine, bend, k, &mut places);
+                }
+            }
         }
         places
     }
@@ -525,7 +555,7 @@ impl<'a> Crossed<'a> {
         let found = panels::volume(self, [along, moving, planes], tolerance);
         Integral {
             value: found.value.clamp(0.0, 1.0),
-            error: found.error + 16.0 * f64::EPSILON,
+            error: found.error + self.rounding,
         }
     }
 }

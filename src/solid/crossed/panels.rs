@@ -10,6 +10,8 @@ use smallvec::SmallVec;
 const DEPTH: u32 = 40;
 /// Stretches narrower than this, in voxels, are left out.
 const NARROW: f64 = 1e-13;
+/// How near to the ends of a stretch it is looked at, as a share of it.
+const VERGE: f64 = 1e-6;
 /// Share of the tolerance that the integrals of planes take.
 const INNER: f64 = 0.2;
 /// Share of it that one stretch takes: there are some.
@@ -54,6 +56,13 @@ impl Stretch {
 
     fn width(&self) -> f64 {
         self.ends[1] - self.ends[0]
+    }
+
+    /// Places next to both ends.
+    fn verges(&self) -> [f64; 2] {
+        let [a, b] = self.ends;
+        let room = VERGE * (b - a);
+        [a + room, b - room]
     }
 }
 
@@ -182,11 +191,12 @@ fn of_planes(
     slice: &impl Fn(f64) -> Slice,
 ) -> Result<Integral, [Stretch; 2]> {
     let last = stretch.depth >= DEPTH || voxel.is_spent();
-    let quick = planes_by(&SEVEN, stretch, slice, last)?;
+    let tolerance = tolerance.max(voxel.rounding);
+    let quick = planes_by(&SEVEN, stretch, tolerance, slice, last)?;
     if quick.error <= tolerance {
         return Ok(quick);
     }
-    let long = planes_by(&FIFTEEN, stretch, slice, last)?;
+    let long = planes_by(&FIFTEEN, stretch, tolerance, slice, last)?;
     if long.error <= tolerance || last {
         return Ok(long);
     }
@@ -197,49 +207,107 @@ fn of_planes(
 fn planes_by<const N: usize>(
     rule: &Nested<N>,
     stretch: Stretch,
+    tolerance: f64,
     slice: &impl Fn(f64) -> Slice,
     last: bool,
 ) -> Result<Integral, [Stretch; 2]> {
     let mut values = [0.0; N];
-    let mut before: Option<(f64, u64)> = None;
+    let mut before: Option<(f64, Slice)> = None;
+    let mut change: Option<[(f64, Slice); 2]> = None;
     let mut carried: f64 = 0.0;
-    for (value, u) in values.iter_mut().zip(points(rule)) {
-        let (at, slope) = stretch.place(u);
-        let Slice { area, corners } = slice(at);
-        if let Some((from, same)) = before
-            && same != corners
-            && !last
+    let mut spread = Spread::default();
+    let [low, high] = stretch.verges();
+    // The ends are looked at once.
+    let ends = N == 7 && !last;
+    if ends {
+        before = Some((low, slice(low)));
+    }
+    let us = points(rule);
+    for i in 0..=N {
+        if i == N && !ends {
+            break;
+        }
+        let (at, slope) = us.get(i).map_or((high, 0.0), |u| stretch.place(*u));
+        let here = slice(at);
+        if let Some(before) = before
+            && before.1.corners != here.corners
         {
-            let place = change_of_planes(from, at, same, slice);
+            change.get_or_insert([before, (at, here)]);
+            if stretch.width() > SLIGHT && !last {
+                break;
+            }
+        }
+        before = Some((at, here));
+        carried = carried.max(here.area.error);
+        spread.add(here.area.value);
+        if let Some(value) = values.get_mut(i) {
+            *value = here.area.value * slope;
+        }
+    }
+    let unknown = spread.width() * stretch.width();
+    match change {
+        Some([from, to])
+            if !last && (stretch.width() > SLIGHT || unknown > UNKNOWN * tolerance) =>
+        {
+            let place = change_of_planes(from, to, tolerance, slice);
             return Err(stretch.cut(place, true));
         }
-        before = Some((at, corners));
-        carried = carried.max(area.error);
-        *value = area.value * slope;
+        _ => {}
     }
     let sum = rule.sum(&values);
+    let unknown = if change.is_some() { unknown } else { 0.0 };
     Ok(Integral {
-        error: sum.error + carried * stretch.width(),
+        error: sum.error.max(unknown) + carried * stretch.width(),
         ..sum
     })
 }
 
-/// Where the edges that planes cut change.
+/// Stretches narrower than this may be too slight for what changes in them to matter.
+const SLIGHT: f64 = 1e-3;
+/// Share of a tolerance that is left to what is not known where values differ by no more.
+const UNKNOWN: f64 = 0.02;
+
+/// How far values lie apart.
+#[derive(Debug, Clone, Copy)]
+struct Spread([f64; 2]);
+
+impl Default for Spread {
+    fn default() -> Self {
+        Self([f64::INFINITY, f64::NEG_INFINITY])
+    }
+}
+
+impl Spread {
+    fn add(&mut self, value: f64) {
+        self.0 = [self.0[0].min(value), self.0[1].max(value)];
+    }
+
+    fn width(&self) -> f64 {
+        self.0[1] - self.0[0]
+    }
+}
+
+/// Where the edges that planes cut change, to what that place may matter.
 fn change_of_planes(
-    mut from: f64,
-    mut to: f64,
-    corners: u64,
+    mut from: (f64, Slice),
+    mut to: (f64, Slice),
+    tolerance: f64,
     slice: &impl Fn(f64) -> Slice,
 ) -> f64 {
-    while to - from > NARROW {
-        let middle = 0.5 * (from + to);
-        if slice(middle).corners == corners {
-            from = middle;
+    let matters = |a: &(f64, Slice), b: &(f64, Slice)| {
+        let step = (a.1.area.value - b.1.area.value).abs();
+        (b.0 - a.0) * step > 1e-2 * UNKNOWN * tolerance
+    };
+    while to.0 - from.0 > NARROW && matters(&from, &to) {
+        let middle = 0.5 * (from.0 + to.0);
+        let here = slice(middle);
+        if here.corners == from.1.corners {
+            from = (middle, here);
         } else {
-            to = middle;
+            to = (middle, here);
         }
     }
-    0.5 * (from + to)
+    0.5 * (from.0 + to.0)
 }
 
 /// The area within the terms of a plane.
@@ -258,7 +326,10 @@ fn area(voxel: &Crossed, family: Family, tolerance: f64) -> Slice {
                 found.area.value += part.value;
                 found.area.error += part.error;
                 let corners = match &before {
-                    None => ends.iter().map(|e| hash(2, surface(*e))).fold(0, u64::wrapping_add),
+                    None => ends
+                        .iter()
+                        .map(|e| hash(2, surface(*e)))
+                        .fold(0, u64::wrapping_add),
                     Some(last) => corner(last, &ends),
                 };
                 found.corners = found.corners.wrapping_add(corners);
@@ -294,9 +365,7 @@ fn hash(a: u64, b: u32) -> u64 {
 fn corner(before: &[u32], after: &[u32]) -> u64 {
     let mut all: SmallVec<[u32; 24]> = before.iter().chain(after).map(|l| surface(*l)).collect();
     all.sort_unstable();
-    let odd = all
-        .chunk_by(|a, b| a == b)
-        .filter(|run| run.len() % 2 == 1);
+    let odd = all.chunk_by(|a, b| a == b).filter(|run| run.len() % 2 == 1);
     let words = odd.map(|run| run[0]);
     let (count, code) = words.fold((0, 5), |(n, h), w| (n + 1, hash(h, w)));
     if count == 0 { 0 } else { code }
@@ -313,11 +382,12 @@ fn of_rows(
     tolerance: f64,
 ) -> Result<(Integral, Ends), [Stretch; 2]> {
     let last = stretch.depth >= DEPTH || voxel.is_spent();
-    let (quick, ends) = rows_by(&SEVEN, voxel, family, stretch, last)?;
+    let tolerance = tolerance.max(voxel.rounding * stretch.width());
+    let (quick, ends) = rows_by(&SEVEN, voxel, family, stretch, tolerance, last)?;
     if quick.error <= tolerance {
         return Ok((quick, ends));
     }
-    let (long, ends) = rows_by(&FIFTEEN, voxel, family, stretch, last)?;
+    let (long, ends) = rows_by(&FIFTEEN, voxel, family, stretch, tolerance, last)?;
     if long.error <= tolerance || last {
         return Ok((long, ends));
     }
@@ -330,6 +400,7 @@ fn rows_by<const N: usize>(
     voxel: &Crossed,
     family: Family,
     stretch: Stretch,
+    tolerance: f64,
     last: bool,
 ) -> Result<(Integral, Ends), [Stretch; 2]> {
     let us = points(rule);
@@ -337,7 +408,13 @@ fn rows_by<const N: usize>(
         .iter()
         .map(|u| voxel.row_at(family, stretch.place(*u).0))
         .collect();
-    if !last && let Some((place, graded)) = first_change(voxel, family, stretch, &us, &rows) {
+    let mut spread = Spread::default();
+    rows.iter().for_each(|r| spread.add(r.length));
+    let unknown = spread.width() * stretch.width();
+    let slight = stretch.width() <= SLIGHT && unknown <= UNKNOWN * tolerance;
+    if !(last || slight)
+        && let Some((place, graded)) = first_change(voxel, family, stretch, &us, &rows)
+    {
         return Err(stretch.cut(place, graded));
     }
     let mut values = [0.0; N];
@@ -345,7 +422,11 @@ fn rows_by<const N: usize>(
         *value = row.length * stretch.place(u).1;
     }
     let ends = rows[N / 2].visible.clone();
-    Ok((rule.sum(&values), ends))
+    let mut sum = rule.sum(&values);
+    if slight || last && rows.iter().any(|r| r.visible != ends) {
+        sum.error = sum.error.max(unknown);
+    }
+    Ok((sum, ends))
 }
 
 /// The first place within a stretch at which the intervals of its rows change, and whether as a square root.
@@ -367,10 +448,8 @@ fn first_change(
             ));
         }
     }
-    // Between the points surfaces may touch that are apart at each of them.
     let n = rows.len();
-    let probe = |u: f64, i: usize| {
-        let at = stretch.place(u).0;
+    let compared = |at: f64, i: usize| {
         let row = voxel.row_at(family, at);
         (row.visible != rows[i].visible).then(|| {
             let known = place(i);
@@ -381,7 +460,17 @@ fn first_change(
             }
         })
     };
-    let gaps: SmallVec<[SmallVec<[f64; 16]>; 15]> = rows.iter().map(|r| gaps(r)).collect();
+    // No point sees what is beyond the outermost.
+    let [low, high] = stretch.verges();
+    if let Some(found) = compared(low, 0).or_else(|| compared(high, n - 1)) {
+        return Some(found);
+    }
+    // Between the points surfaces may touch that are apart at each of them.
+    let gaps: SmallVec<[SmallVec<[f64; 24]>; 15]> = rows.iter().map(gaps).collect();
+    let same = rows.iter().all(|r| labels(r).eq(labels(&rows[0])));
+    if !same {
+        return None;
+    }
     for k in 0..gaps[0].len() {
         let all = || gaps.iter().map(|g| g.get(k).copied().unwrap_or(f64::NAN));
         let values: SmallVec<[f64; 15]> = all().collect();
@@ -399,16 +488,7 @@ fn first_change(
             if least < 0.5 * b
                 && u > x
                 && u < z
-                && let Some(found) = probe(u, i)
-            {
-                return Some(found);
-            }
-        }
-        for (i, next, end) in [(0, 1, 1e-9), (n - 1, n - 2, 1.0 - 1e-9)] {
-            let slope = (values[next] - values[i]) / (us[next] - us[i]);
-            let there = values[i] + slope * (end - us[i]);
-            if there < 0.5 * values[i]
-                && let Some(found) = probe(end, i)
+                && let Some(found) = compared(stretch.place(u).0, i)
             {
                 return Some(found);
             }
@@ -417,19 +497,21 @@ fn first_change(
     None
 }
 
-/// How far the ends of a row's intervals are from what crosses the row next before and after them.
-fn gaps(row: &Row) -> SmallVec<[f64; 16]> {
+/// What crosses a row within the voxel.
+fn labels(row: &Row) -> impl Iterator<Item = u32> + '_ {
+    let within = row.events.iter().filter(|e| e.place.abs() < 0.5);
+    within.map(|e| e.label)
+}
+
+/// How far what crosses a row is from each other, and from the voxel's sides.
+fn gaps(row: &Row) -> SmallVec<[f64; 24]> {
     let mut found = SmallVec::new();
-    for label in &row.visible {
-        let Some(i) = row.events.iter().position(|e| e.label == *label) else {
-            continue;
-        };
-        let here = row.events[i].place;
-        let before = i.checked_sub(1).map_or(f64::NEG_INFINITY, |i| row.events[i].place);
-        let after = row.events.get(i + 1).map_or(f64::INFINITY, |e| e.place);
-        found.push(here - before.max(-0.5));
-        found.push(after.min(0.5) - here);
+    let mut before = -0.5;
+    for event in row.events.iter().filter(|e| e.place.abs() < 0.5) {
+        found.push(event.place - before);
+        before = event.place;
     }
+    found.push(0.5 - before);
     found
 }
 
@@ -481,12 +563,15 @@ fn change_of_rows(
         }
     }
     let (mut a, mut b) = (from, to);
-    while b - a > NARROW {
+    let mut lengths = [first.length, last.length];
+    // To what the place may matter, at the least tolerance.
+    while b - a > NARROW && (b - a) * (lengths[1] - lengths[0]).abs() > 1e-18 {
         let middle = 0.5 * (a + b);
-        if voxel.row_at(family, middle).visible == *l {
-            a = middle;
+        let row = voxel.row_at(family, middle);
+        if row.visible == *l {
+            (a, lengths[0]) = (middle, row.length);
         } else {
-            b = middle;
+            (b, lengths[1]) = (middle, row.length);
         }
     }
     (0.5 * (a + b), true)

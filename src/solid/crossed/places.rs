@@ -100,7 +100,7 @@ fn of_bend(bend: &Bend, frame: &Aligned, family: Family, out: &mut Places) {
             }
         }
         for [_, z] in bend.ends {
-            out.push((frame.from_height(z), false));
+            out.push((frame.from_height(z), true));
         }
     } else {
         let q = frame.across(k, fixed);
@@ -125,7 +125,12 @@ fn at_both(frame: &Aligned, j: usize, square: f64, graded: bool, out: &mut Place
 }
 
 /// Adds the places at which rows pass a circle about the axis.
-pub(super) fn of_rim(affine: &Affine, [r, z]: [f64; 2], family: Family, out: &mut Places) {
+pub(super) fn of_rim(
+    affine: &Affine,
+    ([r, z], bent): ([f64; 2], bool),
+    family: Family,
+    out: &mut Places,
+) {
     let (i, j, k) = (family.along, family.moving, family.fixed());
     let height = affine.form(2);
     let (hi, hj) = (height.slope[i], height.slope[j]);
@@ -155,20 +160,39 @@ pub(super) fn of_rim(affine: &Affine, [r, z]: [f64; 2], family: Family, out: &mu
         square(start.x, start.y) - r * r,
     ];
     if hs == 0.0 && first == j {
-        out.push((base[j], false));
+        out.push((base[j], bent));
         return;
     }
     for (s, _) in zeros(coefficients) {
-        out.push((at(s)[j], false));
+        out.push((at(s)[j], bent));
     }
 }
 
 /// Adds how far along `k` a circle about the axis reaches.
-pub(super) fn reach_of_rim(affine: &Affine, [r, z]: [f64; 2], k: usize, out: &mut Places) {
+pub(super) fn reach_of_rim(
+    affine: &Affine,
+    ([r, z], bent): ([f64; 2], bool),
+    k: usize,
+    out: &mut Places,
+) {
     let m = affine.m[k];
     let middle = affine.place(k, DVec3::new(0.0, 0.0, z));
     let half = r * m.x.hypot(m.y) / m.length_squared();
-    let graded = m.x.hypot(m.y) > 1e-14 * m.length();
+    let graded = bent || m.x.hypot(m.y) > 1e-14 * m.length();
     out.push((middle - half, graded));
     out.push((middle + half, graded));
+}
+
+/// Adds how far along `k` what a circle sweeps about a slanted axis reaches. Of other pieces that is not known.
+pub(super) fn reach_of_bend(affine: &Affine, bend: &Bend, k: usize, out: &mut Places) {
+    let Some(([r, z], radius)) = bend.circle() else {
+        return;
+    };
+    let m = affine.m[k];
+    let middle = affine.place(k, DVec3::new(0.0, 0.0, z));
+    let (out_of, reach) = (r * m.x.hypot(m.y) / m.length_squared(), radius / m.length());
+    for sign in [-1.0, 1.0] {
+        out.push((middle + sign * out_of - reach, true));
+        out.push((middle + sign * out_of + reach, true));
+    }
 }

@@ -251,6 +251,11 @@ impl<'a> Bend<'a> {
         }
     }
 
+    /// Centre, (r, z), and radius of a circular piece.
+    pub(super) fn circle(&self) -> Option<([f64; 2], f64)> {
+        self.circle.map(|c| (c.centre, c.radius))
+    }
+
     /// The other coordinate where `c` is `v`; `None` beyond the piece.
     pub(super) fn at(&self, c: usize, v: f64) -> Option<f64> {
         let (a, b) = (self.ends[0][c], self.ends[1][c]);
@@ -327,10 +332,7 @@ pub(super) enum Sheet<'a> {
     /// A whole quadric: positive outside.
     Ball { quadric: Quadric },
     /// A ring normal to the axis, or a whole plane: positive above.
-    Plane {
-        form: Form,
-        radii: Option<[f64; 2]>,
-    },
+    Plane { form: Form, radii: Option<[f64; 2]> },
     /// What any other piece sweeps.
     Bent(Bend<'a>),
 }
@@ -521,7 +523,8 @@ fn parameters(piece: &Piece, o: DVec3, d: DVec3) -> SmallVec<[f64; 16]> {
     let plus = |a: &[f64], b: &[f64], times: f64| -> Coefficients<f64> {
         a.iter().zip(b).map(|(a, b)| a + times * b).collect()
     };
-    let scaled = |a: &[f64], times: f64| -> Coefficients<f64> { a.iter().map(|a| a * times).collect() };
+    let scaled =
+        |a: &[f64], times: f64| -> Coefficients<f64> { a.iter().map(|a| a * times).collect() };
     let (r, z) = (plus(&r, &w, origin[0]), plus(&z, &w, origin[1] - o.z));
     let [x, y] = [[o.x, d.x], [o.y, d.y]].map(|[o, d_across]| {
         let even = scaled(&w, d.z * o);
