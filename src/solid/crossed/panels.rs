@@ -10,6 +10,8 @@ use smallvec::SmallVec;
 const DEPTH: u32 = 40;
 /// Stretches narrower than this, in voxels, are left out.
 const NARROW: f64 = 1e-13;
+/// How near to a side of the voxel a square root counts as beginning on it, in voxels.
+const BESIDE: f64 = 1e-6;
 /// How near to the ends of a stretch it is looked at, as a share of it.
 const VERGE: f64 = 1e-6;
 /// Share of the tolerance that the integrals of planes take.
@@ -68,9 +70,11 @@ impl Stretch {
 
 /// The stretches between places, which are sorted here.
 fn stretches(mut places: Places) -> SmallVec<[Stretch; 24]> {
+    // What begins on a side of the voxel, or next to it, is a square root there, too.
+    let graded = |at: f64| places.iter().any(|p| p.1 && (p.0 - at).abs() <= BESIDE);
+    let ends = [(-0.5, graded(-0.5)), (0.5, graded(0.5))];
     places.retain(|p| p.0 > -0.5 && p.0 < 0.5);
-    places.push((-0.5, false));
-    places.push((0.5, false));
+    places.extend(ends);
     places.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut ends: SmallVec<[(f64, bool); 24]> = SmallVec::new();
     for (place, graded) in places {
