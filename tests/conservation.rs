@@ -100,6 +100,7 @@ fn composites_on_coarse_grids() {
         "steinmetz",
         "overlap",
         "flange",
+        "assembly",
     ];
     table(&names.map(str::to_owned), &[4]);
 }
@@ -117,6 +118,7 @@ fn all_scenes_on_a_fine_grid() {
     let slow = [
         "assembly",
         "flange",
+        "assembly",
         "graded_block",
         "cone",
         "half_torus",
