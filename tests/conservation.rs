@@ -118,7 +118,6 @@ fn all_scenes_on_a_fine_grid() {
     let slow = [
         "assembly",
         "flange",
-        "assembly",
         "graded_block",
         "cone",
         "half_torus",
