@@ -17,7 +17,7 @@ use crate::io::stack::{
 use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{
-    Certainty, Channel, FRACTION_PROMISE, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
+    Certainty, Channel, FRACTION_ERROR, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
 };
 use crate::scene::{
     ChannelModel, ChannelName, CompressionName, FormatName, PARAMETERS, Scene, nearest,
@@ -119,14 +119,17 @@ pub(super) fn run(
     let Ways {
         flux,
         sections,
+        crossed,
         divided,
     } = tally.ways;
     tracing::debug!(
         flux,
         sections,
+        crossed,
         divided,
         "voxels whose fractions were integrated"
     );
+    within_error(&tally, plan.selection.fraction_error)?;
     if let Some(warning) = said_of_fractions(&tally) {
         console.warn(&warning);
     }
@@ -611,15 +614,38 @@ fn said_of_volume(scene: &Scene) -> Option<&'static str> {
     }
 }
 
+/// Refuses fractions that are not as near as the command asks, naming what can be had. Where it asks for nothing, they
+/// are [said](said_of_fractions) to be less near.
+fn within_error(tally: &Tally, asked: Option<f64>) -> Result<(), Failure> {
+    let Loose { voxels, bound } = tally.loose;
+    match asked {
+        Some(asked) if voxels > 0 => {
+            let bound = rounded_up(bound);
+            Err(Failure::usage(format!(
+                "--fraction-error: {voxels} voxels are known to within {bound:.1e} only, not {asked:e}; take \
+                 --fraction-error {bound:.1e}, or a grid that is moved a little, where surfaces touch sides of voxels"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What is to be said of fractions that are not as near as is promised.
 fn said_of_fractions(tally: &Tally) -> Option<String> {
     let Loose { voxels, bound } = tally.loose;
     (voxels > 0).then(|| {
+        let bound = rounded_up(bound);
         format!(
-            "fraction: {voxels} voxels are known to within {bound:.1e} only, not {FRACTION_PROMISE:e}: surfaces touch their \
-             sides, or nearly coincide in them; a grid that is moved a little may do better"
+            "fraction: {voxels} voxels are known to within {bound:.1e} only, not {FRACTION_ERROR:e}: surfaces touch their \
+             sides, or nearly coincide in them, or are those of a volume that is no turned solid"
         )
     })
+}
+
+/// A bound to two digits, so that it can be had as it is written.
+fn rounded_up(bound: f64) -> f64 {
+    let unit = 10_f64.powf(bound.log10().floor() - 1.0);
+    (bound / unit * (1.0 - 1e-9)).ceil() * unit
 }
 
 fn warnings(scene: &Scene, plan: &Plan, tally: Option<&Tally>) -> Vec<String> {

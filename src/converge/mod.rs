@@ -21,8 +21,8 @@ use crate::work::in_parts;
 use crate::{Error, sample};
 use glam::DVec3;
 
-/// What a fraction may be off by, where a surface passes through its voxel.
-pub const FRACTION_BOUND: f64 = sample::FRACTION_PROMISE;
+/// What a fraction may be off by, where a surface passes through its voxel: that of voxels that have to be divided.
+pub const FRACTION_BOUND: f64 = 1e-6;
 
 /// Errors at one resolution.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,11 +11,13 @@ use super::layer::Cancel;
 use super::tally::Tally;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Side};
-use crate::solid::{Assembly, Factor, TOLERANCE, Term, VoxelShape};
+use crate::solid::{Assembly, Crossed, Factor, STRETCHES, TOLERANCE, Term, VoxelShape};
 use glam::DVec3;
 
 /// A larger error of the flux gains nothing, and would be seen in the sum.
 const FOR_SUMS: f64 = 1e-9;
+/// Share of the error asked for that an estimate is to be below.
+const ESTIMATED: f64 = 0.25;
 /// Estimates of sections that are asked for less than this take long and gain nothing.
 const LEAST: f64 = 1e-10;
 
@@ -27,8 +29,12 @@ pub(super) struct FractionSampler {
     reach: f64,
     /// For each body the flux through the sides of its voxels, where it can be had.
     fluxes: Vec<Option<FluxSampler>>,
+    /// Error allowed to a share.
+    error: f64,
     /// Estimated error allowed to a stretch of a body's surface in a voxel.
     tolerance: f64,
+    /// Estimated error allowed to the share of a voxel that several bodies cross.
+    estimated: f64,
 }
 
 /// What one thread reuses.
@@ -55,7 +61,9 @@ impl FractionSampler {
             shapes,
             reach: reach(sides),
             fluxes: assembly.bodies().iter().map(flux).collect(),
-            tolerance: error.clamp(LEAST, TOLERANCE),
+            error,
+            tolerance: (error / STRETCHES).clamp(LEAST, TOLERANCE),
+            estimated: ESTIMATED * error.min(FOR_SUMS),
         }
     }
 
@@ -74,7 +82,7 @@ impl FractionSampler {
         let body = assembly.bodies()[single].turned_region()?;
         let filled = flux.layer(how, body, k, &mut scratch.flux, out)?;
         tally.ways.flux += filled.cut;
-        tally.loose.count_all(filled.cut, filled.bound);
+        tally.loose.count(filled.cut, filled.bound, self.error);
         Some(filled.sum)
     }
 
@@ -166,22 +174,28 @@ impl FractionSampler {
                         let one = term.factors[0];
                         let share = if let Some(share) = known(one.body, i) {
                             tally.ways.flux += 1;
-                            tally.loose.count(scratch.bound);
+                            tally.loose.count(1, scratch.bound, self.error);
                             share
                         } else {
                             let shape = &self.shapes[one.body];
                             let body = &bodies[one.body];
                             let share = body.fraction_within(shape, centre, &[], self.tolerance);
                             tally.ways.sections += 1;
-                            tally.loose.count(share.error);
+                            tally.loose.count(1, share.error, self.error);
                             share.value
                         };
                         if one.complement { 1.0 - share } else { share }
                     }
                     several => {
-                        let share = divided::share(assembly, several, centre, self.sides);
-                        tally.ways.divided += 1;
-                        tally.loose.count(share.error);
+                        let chords = Crossed::new(bodies, several, centre, self.sides);
+                        let share = if let Some(chords) = chords {
+                            tally.ways.crossed += 1;
+                            chords.share(self.estimated)
+                        } else {
+                            tally.ways.divided += 1;
+                            divided::share(assembly, several, centre, self.sides)
+                        };
+                        tally.loose.count(1, share.error, self.error);
                         share.value
                     }
                 },

@@ -54,5 +54,5 @@ mod wedge;
 
 pub(crate) use layer::stored;
 pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
-pub use tally::{Certainty, FRACTION_ERROR, FRACTION_PROMISE, Loose, Tally, Ways};
+pub use tally::{Certainty, FRACTION_ERROR, Loose, Tally, Ways};
 pub use volume::{filled, fraction, material, occupancy, occupancy_bits, signed_distance};

@@ -9,7 +9,7 @@ pub struct Tally {
     pub certainty: Certainty,
     /// Voxels of each material id, those of none left out.
     pub materials: BTreeMap<u32, u64>,
-    /// Fractions that are not known as well as is promised.
+    /// Fractions that are not known as well as is asked.
     pub loose: Loose,
     /// How the fractions of voxels were found that a surface may pass through.
     pub ways: Ways,
@@ -22,18 +22,16 @@ pub struct Ways {
     pub flux: u64,
     /// By the sections of one body in them.
     pub sections: u64,
-    /// By division, as several bodies touch them.
+    /// By the chords of rows, as several bodies cross them.
+    pub crossed: u64,
+    /// By division, as several bodies touch them of which one has no chords.
     pub divided: u64,
 }
 
 /// Error allowed to a fraction, in voxels, where no other is asked for.
 pub const FRACTION_ERROR: f64 = 1e-9;
 
-/// Error of a fraction, in voxels, up to which nothing is said: what voxels that several surfaces pass through are
-/// divided down to.
-pub const FRACTION_PROMISE: f64 = 1e-6;
-
-/// Fractions whose bound is above [`FRACTION_PROMISE`].
+/// Fractions whose bound is above the error that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Loose {
     /// How many there are.
@@ -43,18 +41,11 @@ pub struct Loose {
 }
 
 impl Loose {
-    /// Counts fractions of one bound.
-    pub(super) fn count_all(&mut self, voxels: u64, bound: f64) {
-        if bound > FRACTION_PROMISE * (1.0 + 1e-6) && voxels > 0 {
-            self.voxels += voxels;
-            self.bound = self.bound.max(bound);
-        }
-    }
-
-    pub(super) fn count(&mut self, bound: f64) {
+    /// Counts fractions of one bound, of which `error` is asked.
+    pub(super) fn count(&mut self, voxels: u64, bound: f64, error: f64) {
         // A bound that just meets it is a sum of many.
-        if bound > FRACTION_PROMISE * (1.0 + 1e-6) {
-            self.voxels += 1;
+        if bound > error * (1.0 + 1e-6) && voxels > 0 {
+            self.voxels += voxels;
             self.bound = self.bound.max(bound);
         }
     }
@@ -85,6 +76,7 @@ impl Tally {
         self.loose.bound = self.loose.bound.max(other.loose.bound);
         self.ways.flux += other.ways.flux;
         self.ways.sections += other.ways.sections;
+        self.ways.crossed += other.ways.crossed;
         self.ways.divided += other.ways.divided;
         for (&material, &voxels) in &other.materials {
             *self.materials.entry(material).or_default() += voxels;

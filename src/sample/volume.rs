@@ -149,8 +149,9 @@ pub fn occupancy_bits(scene: &Scene, grid: &GridSpec) -> Result<BitVolume, crate
     Ok(BitVolume::new(*grid, words))
 }
 
-/// Share of each voxel that the solid fills, within [`FRACTION_ERROR`](super::FRACTION_ERROR) before it is rounded, or
-/// where surfaces of several solids pass through it within [`FRACTION_PROMISE`](super::FRACTION_PROMISE).
+/// Share of each voxel that the solid fills, within [`FRACTION_ERROR`](super::FRACTION_ERROR) before it is rounded; where
+/// surfaces of several solids pass through it, of which one is a volume that is not turned, within 1e-6. What could not
+/// be had is counted in [`Tally::loose`](super::Tally::loose) of a [`LayerSampler`]'s layers.
 ///
 /// # Errors
 /// [`crate::Error`] when the volume does not fit the address space.

@@ -53,6 +53,9 @@ macro_rules! family {
     };
 }
 
+/// Stretches of a surface that a voxel meets, as a rule, each within the tolerance of an estimate.
+pub(crate) const STRETCHES: f64 = 4.0;
+
 /// What the voxels of one grid share for the fractions of one body.
 #[derive(Debug, Clone)]
 pub(crate) struct VoxelShape {
@@ -189,7 +192,7 @@ impl Body {
         };
         Integral {
             value,
-            error: tolerance,
+            error: STRETCHES * tolerance,
         }
     }
 

@@ -589,7 +589,7 @@ struct Stretch<'a> {
     to: f64,
 }
 
-type Cuts = SmallVec<[f64; 16]>;
+pub(super) type Cuts = SmallVec<[f64; 16]>;
 /// Parameters with whether the circle touches a side there.
 type KindCuts = SmallVec<[(f64, bool); 16]>;
 
@@ -801,7 +801,7 @@ impl<'a> Stretch<'a> {
 
 /// Adds the parameters between `from` and `to` at which a polynomial with these coefficients there changes its sign;
 /// where two may be too near to each other to be told apart, a place between.
-fn sign_changes(c: &[f64], from: f64, to: f64, depth: u32, cuts: &mut Cuts) {
+pub(super) fn sign_changes(c: &[f64], from: f64, to: f64, depth: u32, cuts: &mut Cuts) {
     /// Zeros nearer to each other than 2^-30 of the stretch bound no panel worth cutting.
     const DEPTH: u32 = 30;
     let signs = c.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
@@ -830,7 +830,7 @@ fn sign_changes(c: &[f64], from: f64, to: f64, depth: u32, cuts: &mut Cuts) {
 }
 
 /// The parameter at which coordinate `c` of a piece takes the value `v`, clamped to the piece.
-fn parameter(piece: &Piece, c: usize, v: f64) -> f64 {
+pub(super) fn parameter(piece: &Piece, c: usize, v: f64) -> f64 {
     let (start, end) = (piece.start()[c].f64(), piece.end()[c].f64());
     let rising = end > start;
     if v == start || (v < start) == rising {
@@ -849,7 +849,7 @@ fn parameter(piece: &Piece, c: usize, v: f64) -> f64 {
 
 /// The root of `f` between `a` and `b`: the secant, halving the value at the end it keeps. Where the
 /// values at the ends do not differ in sign, the root is within rounding of the end nearer to it.
-fn illinois(f: &impl Fn(f64) -> f64, a: f64, b: f64, f_a: f64, f_b: f64) -> f64 {
+pub(super) fn illinois(f: &impl Fn(f64) -> f64, a: f64, b: f64, f_a: f64, f_b: f64) -> f64 {
     let (mut lo, mut hi, mut f_lo, mut f_hi) = (a, b, f_a, f_b);
     if (f_lo < 0.0) == (f_hi < 0.0) {
         return if f_lo.abs() < f_hi.abs() { a } else { b };

@@ -13,6 +13,7 @@ mod bounds;
 mod coaxial;
 mod composite;
 mod cross_section;
+mod crossed;
 mod ellipsoid;
 mod faces;
 mod flux;
@@ -46,7 +47,8 @@ pub use revolved::Revolved;
 pub use turn::Turn;
 
 pub(crate) use assembly::{Measured, Reaches, signed};
-pub(crate) use body::VoxelShape;
+pub(crate) use body::{STRETCHES, VoxelShape};
+pub(crate) use crossed::Crossed;
 pub(crate) use fraction::{SNAP, TOLERANCE};
 pub(crate) use nearest::{Nearest, Vicinity};
 pub(crate) use row::{Cuts, LayerCuts, Ring, Row};

@@ -275,6 +275,23 @@ impl Revolved {
         found
     }
 
+    /// Calls `each` with the pieces that sweep the surface whose boxes meet a box of the half-plane, in the body's unit.
+    pub(super) fn boundary_within<'a>(
+        &'a self,
+        wanted: &Box2,
+        mut each: impl FnMut(BoundaryPiece<'a>),
+    ) {
+        self.section.boundary_tree().visit(
+            |b| b.overlaps(wanted),
+            |i| {
+                let part = self.boundary().at(i as usize);
+                if !part.piece.on_axis && part.piece.bounds().overlaps(wanted) {
+                    each(part);
+                }
+            },
+        );
+    }
+
     /// The body moved by `by`.
     pub(super) fn translated(&self, by: DVec3) -> Self {
         Self::new(
