@@ -168,10 +168,9 @@ impl Solid {
             }
             Shape::Ellipsoid(r) => {
                 let squares = [x, y, z].map(|c| product(&c, &c));
-                let all = (0..3).fold(vec![-1.0], |all, i| {
+                (0..3).fold(vec![-1.0], |all, i| {
                     sum(&all, &squares[i], 1.0 / (r[i] * r[i]))
-                });
-                all
+                })
             }
             Shape::Block(s) => {
                 for i in 0..3 {

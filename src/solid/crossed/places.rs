@@ -83,7 +83,7 @@ fn of_bend(bend: &Bend, frame: &Aligned, family: Family, out: &mut Places) {
             return;
         };
         for x in [-r, r] {
-            out.push((frame.from_across(j, x), true));
+            out.push((frame.across_from(j, x), true));
         }
         for side in SIDES {
             let u = frame.across(i, side);
@@ -92,15 +92,15 @@ fn of_bend(bend: &Bend, frame: &Aligned, family: Family, out: &mut Places) {
     } else if frame.axis == j {
         let q = frame.across(k, fixed);
         if let Some(z) = bend.at(0, q.abs()) {
-            out.push((frame.from_height(z), true));
+            out.push((frame.height_from(z), true));
         }
         for side in SIDES {
             if let Some(z) = bend.at(0, q.hypot(frame.across(i, side))) {
-                out.push((frame.from_height(z), false));
+                out.push((frame.height_from(z), false));
             }
         }
         for [_, z] in bend.ends {
-            out.push((frame.from_height(z), true));
+            out.push((frame.height_from(z), true));
         }
     } else {
         let q = frame.across(k, fixed);
@@ -112,15 +112,15 @@ fn of_bend(bend: &Bend, frame: &Aligned, family: Family, out: &mut Places) {
                 at_both(frame, j, (r - q) * (r + q), false, out);
             }
         }
-        out.push((frame.from_across(j, 0.0), false));
+        out.push((frame.across_from(j, 0.0), false));
     }
 }
 
 fn at_both(frame: &Aligned, j: usize, square: f64, graded: bool, out: &mut Places) {
     if square >= 0.0 {
         let x = square.sqrt();
-        out.push((frame.from_across(j, -x), graded));
-        out.push((frame.from_across(j, x), graded));
+        out.push((frame.across_from(j, -x), graded));
+        out.push((frame.across_from(j, x), graded));
     }
 }
 

@@ -194,7 +194,7 @@ impl Aligned {
         self.x0[k] + self.scale[k] * p
     }
 
-    pub(super) fn from_across(&self, k: usize, x: f64) -> f64 {
+    pub(super) fn across_from(&self, k: usize, x: f64) -> f64 {
         (x - self.x0[k]) / self.scale[k]
     }
 
@@ -202,7 +202,7 @@ impl Aligned {
         self.z0 + self.rise * p
     }
 
-    pub(super) fn from_height(&self, z: f64) -> f64 {
+    pub(super) fn height_from(&self, z: f64) -> f64 {
         (z - self.z0) / self.rise
     }
 }
@@ -433,7 +433,7 @@ impl Surface<'_> {
                 .hypot(frame.across(k, through[k]));
             if let Some(z) = bend.at(0, r) {
                 let upward = frame.rise > 0.0;
-                add(frame.from_height(z), 0, self.inside_above == upward);
+                add(frame.height_from(z), 0, self.inside_above == upward);
             }
             return;
         }
@@ -445,8 +445,8 @@ impl Surface<'_> {
         let square = (r - q) * (r + q);
         if square > 0.0 {
             let x = square.sqrt();
-            add(frame.from_across(along, -x), 0, self.inside_below);
-            add(frame.from_across(along, x), 1, !self.inside_below);
+            add(frame.across_from(along, -x), 0, self.inside_below);
+            add(frame.across_from(along, x), 1, !self.inside_below);
         }
     }
 
@@ -488,8 +488,7 @@ impl Surface<'_> {
             }
             return;
         }
-        let mut branch = 0;
-        for t in parameters(piece, o, d) {
+        for (branch, t) in (0..).zip(parameters(piece, o, d)) {
             let twin = piece.twin();
             let at = twin.at(t);
             let (r, z) = (at[0] + twin.origin[0], at[1] + twin.origin[1]);
@@ -507,7 +506,6 @@ impl Surface<'_> {
             if let Some(s) = s {
                 crossing(s, t, branch);
             }
-            branch += 1;
         }
     }
 }
