@@ -571,9 +571,15 @@ impl<'a> Crossed<'a> {
                 break;
             }
         }
+        // What faces that coincide leave between them is rounding: where the solid's surface is far nothing is.
+        let value = match best.value {
+            v if v <= self.rounding => 0.0,
+            v if v >= 1.0 - self.rounding => 1.0,
+            v => v,
+        };
         Integral {
-            value: best.value.clamp(0.0, 1.0),
-            error: best.error + self.rounding,
+            value,
+            error: best.error + 2.0 * self.rounding,
         }
     }
 }
