@@ -19,7 +19,8 @@
 //!
 //! Faces that several bodies share need no care: an interval between them has no length.
 //!
-//! * Error: distances of nested rules, on the integrals between cuts, which are analytic there; square roots at cuts are
+//! * Error: the distance of two answers, of rows along different directions, beside that of nested rules on the integrals
+//!   between cuts, which are analytic there; square roots at cuts are
 //!   smoothed by a substitution. Where rows run out before the estimates are small the error says so.
 
 mod panels;
@@ -552,21 +553,28 @@ impl<'a> Crossed<'a> {
     /// The share of the voxel in the terms, with an estimate of its error that should be some `tolerance`, up to four.
     pub(crate) fn share(&self, tolerance: f64) -> Integral {
         let [along, moving, planes] = self.directions();
+        let orders = [
+            [along, moving, planes],
+            [moving, planes, along],
+            [planes, along, moving],
+        ];
+        // What is overlooked from one direction is seen from another: two have to agree.
+        let mut found: SmallVec<[Integral; 3]> = SmallVec::new();
         let mut best = Integral {
             value: 0.5,
             error: 0.5,
         };
-        // What touches a row touches one of another direction no more.
-        for order in [
-            [along, moving, planes],
-            [moving, planes, along],
-            [planes, along, moving],
-        ] {
+        for order in orders {
             self.rows.set(0);
-            let found = panels::volume(self, order, tolerance);
-            if found.error < best.error {
-                best = found;
+            let one = panels::volume(self, order, tolerance);
+            for other in &found {
+                let error = (one.value - other.value).abs() + one.error.min(other.error);
+                if error < best.error {
+                    let nearer = if one.error < other.error { one } else { *other };
+                    best = Integral { error, ..nearer };
+                }
             }
+            found.push(one);
             if best.error <= 4.0 * tolerance {
                 break;
             }

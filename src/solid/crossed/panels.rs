@@ -115,7 +115,9 @@ impl Crossed<'_> {
         for stretch in all {
             let row = self.row_at(family, 0.5 * (stretch.ends[0] + stretch.ends[1]));
             match (&before, kept.last_mut()) {
-                (Some(last), Some(whole)) if last.visible == row.visible => {
+                (Some(last), Some(whole))
+                    if last.visible == row.visible && order(last).eq(order(&row)) =>
+                {
                     whole.ends[1] = stretch.ends[1];
                     whole.graded[1] = stretch.graded[1];
                 }
@@ -469,17 +471,27 @@ fn first_change(
     if let Some(found) = compared(low, 0).or_else(|| compared(high, n - 1)) {
         return Some(found);
     }
+    // Where surfaces change places that end nothing, something may come to light between the changes.
+    for i in 1..n {
+        let found = uncovered(
+            voxel,
+            family,
+            [place(i - 1), place(i)],
+            [&rows[i - 1], &rows[i]],
+        );
+        if found.is_some() {
+            return found;
+        }
+    }
     // Between the points surfaces may touch that are apart at each of them.
     let gaps: SmallVec<[SmallVec<[f64; 24]>; 15]> = rows.iter().map(gaps).collect();
-    let same = rows.iter().all(|r| labels(r).eq(labels(&rows[0])));
-    if !same {
-        return None;
-    }
-    for k in 0..gaps[0].len() {
-        let all = || gaps.iter().map(|g| g.get(k).copied().unwrap_or(f64::NAN));
-        let values: SmallVec<[f64; 15]> = all().collect();
-        for i in 1..n - 1 {
-            let [a, b, c] = [values[i - 1], values[i], values[i + 1]];
+    for i in 1..n - 1 {
+        let [first, here, last] = [&rows[i - 1], &rows[i], &rows[i + 1]];
+        if !(labels(first).eq(labels(here)) && labels(here).eq(labels(last))) {
+            continue;
+        }
+        for k in 0..gaps[i].len() {
+            let [a, b, c] = [gaps[i - 1][k], gaps[i][k], gaps[i + 1][k]];
             if !(b < a && b < c) {
                 continue;
             }
@@ -499,6 +511,58 @@ fn first_change(
         }
     }
     None
+}
+
+/// All that crosses a row, and the voxel's sides, in order.
+fn order(row: &Row) -> impl Iterator<Item = u32> {
+    let mut all: SmallVec<[(f64, u32); 26]> =
+        row.events.iter().map(|e| (e.place, e.label)).collect();
+    let before = all.iter().take_while(|e| e.0 <= -0.5).count();
+    all.insert(before, (-0.5, SIDE[0]));
+    let within = all.iter().take_while(|e| e.0 < 0.5).count();
+    all.insert(within.max(before + 1), (0.5, SIDE[1]));
+    all.into_iter().map(|e| e.1)
+}
+
+/// A place between two rows of equal intervals at which they are others: between the places at which what crosses the rows
+/// changes its order.
+fn uncovered(
+    voxel: &Crossed,
+    family: Family,
+    [from, to]: [f64; 2],
+    [first, last]: [&Row; 2],
+) -> Option<(f64, bool)> {
+    let [a, b] = [first, last].map(|row| order(row).collect::<SmallVec<[u32; 26]>>());
+    if a == b {
+        return None;
+    }
+    let mut marks: SmallVec<[f64; 16]> = SmallVec::new();
+    for (i, &x) in a.iter().enumerate() {
+        let Some(at) = b.iter().position(|&l| l == x) else {
+            continue;
+        };
+        for &y in &a[i + 1..] {
+            if !b[..at].contains(&y) {
+                continue;
+            }
+            let gap = |row: &Row| Some(place_of(row, y)? - place_of(row, x)?);
+            let (Some(fa), Some(fb)) = (gap(first), gap(last)) else {
+                continue;
+            };
+            if (fa < 0.0) != (fb < 0.0) {
+                let f = |p: f64| gap(&voxel.row_at(family, p)).unwrap_or(0.0);
+                marks.push(zero(&f, [from, to], [fa, fb]));
+            }
+        }
+    }
+    marks.extend([from, to]);
+    marks.sort_unstable_by(f64::total_cmp);
+    marks.windows(2).find_map(|w| {
+        let middle = 0.5 * (w[0] + w[1]);
+        let row = (w[1] - w[0] > NARROW).then(|| voxel.row_at(family, middle))?;
+        let differs = row.visible != first.visible;
+        differs.then(|| change_of_rows(voxel, family, [from, middle], [first, &row]))
+    })
 }
 
 /// What crosses a row within the voxel.
