@@ -14,6 +14,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use voxlathe::Scene;
+use voxlathe::grid::Channel;
 use voxlathe::io::exr::{
     Attributes, Compression, LayerEncoder, Samples, decode_layer, layer_attributes,
 };
@@ -31,10 +32,7 @@ fn layer() -> (LayerBuffers, Attributes) {
     let scene = Scene::load_with(path, &set).expect("a scene that ships");
     let grid = scene.grid().expect("a grid");
     assert_eq!(grid.dims(), [SIDE, SIDE, 10]);
-    let selection = Selection {
-        sdf: true,
-        ..Selection::default()
-    };
+    let selection = Selection::of(&[Channel::Sdf], None);
     let mut layer = LayerBuffers::default();
     LayerSampler::new(scene.assembly(), &grid, selection).sample(5, &mut layer);
     let attributes = layer_attributes(&grid, 5, "mm", Some(("goblet", &"0".repeat(64))));

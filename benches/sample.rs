@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Duration;
 use voxlathe::Scene;
-use voxlathe::grid::GridSpec;
+use voxlathe::grid::{Channel, GridSpec};
 use voxlathe::math::{Kernel, SimdLevel};
 use voxlathe::sample::{
     LayerBuffers, LayerSampler, Selection, filled as constant, signed_distance,
@@ -70,11 +70,7 @@ fn load(name: &str) -> (Scene, GridSpec) {
 }
 
 fn distances(band: Option<f64>) -> Selection {
-    Selection {
-        sdf: true,
-        band,
-        ..Selection::default()
-    }
+    Selection::of(&[Channel::Sdf], band)
 }
 
 fn filled(buffer: &mut [f32], value: f32) {

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 use voxlathe::Scene;
-use voxlathe::sample::{Channel, LayerBuffers, LayerSampler, Selection, Tally};
+use voxlathe::grid::Channel;
+use voxlathe::sample::{LayerBuffers, LayerSampler, Selection, Tally};
 
 /// Sum of the fractions by layers, and what was counted.
 fn sums(scene: &Scene) -> (f64, Tally) {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::fmt::Write;
 use support::sampling::Random;
 use voxlathe::Scene;
-use voxlathe::grid::GridSpec;
+use voxlathe::grid::{Channel, GridSpec};
 use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
 
 /// A shape about the z axis of its own frame.
@@ -488,9 +488,8 @@ fn cases() -> Vec<Case> {
 fn found(case: &Case, low: DVec3, sides: DVec3, error: f64) -> f64 {
     let grid = GridSpec::new([1; 3], low, sides).expect("a voxel");
     let selection = Selection {
-        fraction: true,
         fraction_error: Some(error),
-        ..Selection::default()
+        ..Selection::of(&[Channel::Fraction], None)
     };
     let mut buffers = LayerBuffers::default();
     LayerSampler::new(case.scene.assembly(), &grid, selection).sample(0, &mut buffers);

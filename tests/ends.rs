@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use rustix::process::{Pid, Signal, kill_process};
 use support::{below, interruptible_command, names_in, run, scratch, shipped, write_npy};
-use voxlathe::grid::GridSpec;
-use voxlathe::io::exr::{LayerChannels, SampleKind};
+use voxlathe::grid::{Channel, GridSpec};
+use voxlathe::io::exr::Samples;
 use voxlathe::io::stack::{ChannelSpec, StackOptions, StackSummary};
 use voxlathe::io::{Manifest, StackWriter, verify_stack};
 
@@ -513,22 +513,25 @@ fn every_flipped_bit_of_a_small_stack_is_found() {
     run(&[&arguments[..], &size].concat()).exits(0);
     let picture = fs::read(picture).expect("a picture");
     let grid = GridSpec::new([3, 2, 2], DVec3::splat(-0.5), DVec3::splat(0.5)).expect("a grid");
-    let kinds = [
-        ("occupancy", SampleKind::Half),
-        ("fraction", SampleKind::Float),
-        ("sdf", SampleKind::Float),
-        ("material", SampleKind::Uint),
+    let known = [
+        Channel::Occupancy,
+        Channel::Fraction,
+        Channel::Sdf,
+        Channel::Material,
     ];
-    let channels = kinds.map(|(name, kind)| ChannelSpec::named(name, kind, "m"));
+    let channels = known.map(|channel| ChannelSpec::of(channel, "m"));
     let writer = StackWriter::create(&out, &grid, channels.to_vec(), StackOptions::default());
     let writer = writer.expect("a stack");
     for k in 0..2 {
-        let layer = LayerChannels {
-            occupancy: Some(&[1, 0, 0, 1, 0, 0]),
-            fraction: Some(&[0.75, 0.25, 0.0, 1.0, 0.0, 0.0]),
-            sdf: Some(&[-0.1, 0.1, 0.5, -0.2, 0.2, 1.5]),
-            material: Some(&[1, 0, 0, 2, 0, 0]),
-        };
+        let layer = [
+            ("occupancy", Samples::Half(&[1, 0, 0, 1, 0, 0])),
+            (
+                "fraction",
+                Samples::Float(&[0.75, 0.25, 0.0, 1.0, 0.0, 0.0]),
+            ),
+            ("sdf", Samples::Float(&[-0.1, 0.1, 0.5, -0.2, 0.2, 1.5])),
+            ("material", Samples::Uint(&[1, 0, 0, 2, 0, 0])),
+        ];
         writer.write_layer(k, &layer).expect("a layer");
     }
     for name in ["preview.png", "preview-slices.png"] {

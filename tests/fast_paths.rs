@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 use voxlathe::Scene;
-use voxlathe::grid::{BitVolume, GridSpec};
+use voxlathe::grid::{BitVolume, Channel, GridSpec};
 use voxlathe::math::{Kernel, SimdLevel};
 use voxlathe::sample::{LayerBuffers, LayerSampler, Selection};
 
@@ -328,11 +328,7 @@ fn grids(scene: &Scene) -> Vec<GridSpec> {
 }
 
 fn selection(band: Option<f64>) -> Selection {
-    Selection {
-        sdf: true,
-        band,
-        ..Selection::default()
-    }
+    Selection::of(&[Channel::Sdf], band)
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use voxlathe::Scene;
-use voxlathe::grid::GridSpec;
+use voxlathe::grid::{Channel, GridSpec};
 use voxlathe::sample;
 
 fn ball(extra: &str) -> Scene {
@@ -144,10 +144,7 @@ fn sums_before_rounding_are_the_volume() {
             let moved =
                 GridSpec::new(own.dims(), own.origin() + shift, own.spacing()).expect("a grid");
             for grid in [own, moved] {
-                let selection = sample::Selection {
-                    fraction: true,
-                    ..sample::Selection::default()
-                };
+                let selection = sample::Selection::of(&[Channel::Fraction], None);
                 let sampler = sample::LayerSampler::new(scene.assembly(), &grid, selection);
                 let mut layer = sample::LayerBuffers::default();
                 let (mut sum, mut by_flux, mut all) = (0.0, 0, 0);

@@ -6,9 +6,9 @@ use super::interrupt;
 use super::memory::{self, Budget, Need};
 use super::output::{self, Console, NOTHING_LEFT, VOLUME_NOT_MEASURED};
 use crate::error::Error;
-use crate::grid::GridSpec;
+use crate::grid::{Channel, GridSpec};
 use crate::io::available_bytes;
-use crate::io::exr::{Compression, LayerChannels, SampleKind, Samples};
+use crate::io::exr::{Compression, SampleKind, Samples};
 use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_slice_bytes,
@@ -17,11 +17,9 @@ use crate::io::stack::{
 use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{
-    Certainty, Channel, FRACTION_ERROR, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
+    Certainty, FRACTION_ERROR, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
 };
-use crate::scene::{
-    ChannelModel, ChannelName, CompressionName, FormatName, PARAMETERS, Scene, nearest,
-};
+use crate::scene::{ChannelModel, CompressionName, FormatName, PARAMETERS, Scene, nearest};
 use crate::solid::{Operation, Part, Scalar};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -139,7 +137,10 @@ pub(super) fn run(
     }
     let preview = drawn.elapsed().as_secs_f64();
     let summary = StackSummary {
-        fraction_sum: plan.selection.fraction.then_some(fraction_sum),
+        fraction_sum: plan
+            .selection
+            .has(Channel::Fraction)
+            .then_some(fraction_sum),
         ..summary(&scene, &plan, &tally)
     };
     let placed = Instant::now();
@@ -272,7 +273,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         fraction_error: fraction_error(arguments)?,
         ..Selection::of(&wanted, scene.band(&grid))
     };
-    if selection.sdf {
+    if selection.has(Channel::Sdf) {
         check_f32_range(scene, &grid)?;
     }
     let compression = match output.compression {
@@ -366,12 +367,28 @@ fn layer_bytes(
 
 fn channel(model: &ChannelModel) -> Option<Channel> {
     match model {
-        ChannelModel::Known(ChannelName::Occupancy) => Some(Channel::Occupancy),
-        ChannelModel::Known(ChannelName::Fraction) => Some(Channel::Fraction),
-        ChannelModel::Known(ChannelName::Sdf) => Some(Channel::Sdf),
-        ChannelModel::Known(ChannelName::Material) => Some(Channel::Material),
+        ChannelModel::Known(channel) => Some(*channel),
         ChannelModel::Scalar(_) => None,
     }
+}
+
+/// The samples of a layer, by the names of its channels.
+fn layer<'a>(
+    channels: &'a [ChannelSpec],
+    buffers: &'a LayerBuffers,
+) -> Vec<(&'a str, Samples<'a>)> {
+    let mut scalars = buffers.scalars.iter();
+    let samples = |spec: &'a ChannelSpec| {
+        let samples = match Channel::from_name(&spec.name) {
+            Some(Channel::Occupancy) => Samples::Half(&buffers.occupancy),
+            Some(Channel::Fraction) => Samples::Float(&buffers.fraction),
+            Some(Channel::Sdf) => Samples::Float(&buffers.sdf),
+            Some(Channel::Material) => Samples::Uint(&buffers.material),
+            None => Samples::Float(scalars.next()?),
+        };
+        Some((spec.name.as_str(), samples))
+    };
+    channels.iter().filter_map(samples).collect()
 }
 
 fn scalar(model: &ChannelModel) -> Option<Scalar> {
@@ -383,11 +400,7 @@ fn scalar(model: &ChannelModel) -> Option<Scalar> {
 }
 
 fn kind(model: &ChannelModel) -> SampleKind {
-    match model {
-        ChannelModel::Known(ChannelName::Occupancy) => SampleKind::Half,
-        ChannelModel::Known(ChannelName::Material) => SampleKind::Uint,
-        _ => SampleKind::Float,
-    }
+    channel(model).map_or(SampleKind::Float, |channel| channel.stored().into())
 }
 
 /// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand: what remains of the
@@ -494,7 +507,6 @@ fn stream(
     let failure: Mutex<Option<Error>> = Mutex::new(None);
     let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
     let tally = Mutex::new((Tally::default(), vec![0.0; layers]));
-    let has = |name: &str| plan.channels.iter().any(|c| c.name == name);
     let work = |buffers: &mut LayerBuffers, k: usize| -> Result<(), Error> {
         interrupt::check()?;
         let begin = Instant::now();
@@ -502,20 +514,7 @@ fn stream(
         // An interrupted layer is not whole.
         interrupt::check()?;
         let sampled = Instant::now();
-        let layer = LayerChannels {
-            occupancy: has("occupancy").then_some(&buffers.occupancy),
-            fraction: plan.selection.fraction.then_some(&buffers.fraction),
-            sdf: plan.selection.sdf.then_some(&buffers.sdf),
-            material: plan.selection.material.then_some(&buffers.material),
-        };
-        let mut samples = layer.list();
-        let names = plan
-            .channels
-            .iter()
-            .filter(|c| ChannelName::from_name(&c.name).is_none());
-        let scalars = names.zip(&buffers.scalars);
-        samples.extend(scalars.map(|(c, values)| (c.name.as_str(), Samples::Float(values))));
-        writer.write_samples(k, &samples)?;
+        writer.write_layer(k, &layer(&plan.channels, buffers))?;
         let mut all = tally.lock().unwrap_or_else(PoisonError::into_inner);
         all.0.add(&buffers.tally);
         all.1[k] = buffers.fraction_sum;
@@ -692,7 +691,7 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<MaterialVo
     let only = ids.len() == 1;
     let one = |id: u32| {
         let voxels = tally.materials.get(&id).copied().unwrap_or(0);
-        let sampled = plan.selection.material.then_some(voxels);
+        let sampled = plan.selection.has(Channel::Material).then_some(voxels);
         #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
         let volume = sampled.map(|n| n as f64 * voxel);
         let exact = if only {
@@ -737,7 +736,7 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
         materials: json!(scene.model().materials),
         warnings: warnings(scene, plan, Some(tally)),
         material_volumes: material_volumes(scene, plan, tally),
-        certainty: if plan.selection.sdf {
+        certainty: if plan.selection.has(Channel::Sdf) {
             certainty(&tally.certainty)
         } else {
             Value::Null

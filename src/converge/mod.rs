@@ -13,12 +13,12 @@ mod plot;
 
 pub use fit::order;
 
-use crate::grid::GridSpec;
+use crate::Error;
+use crate::grid::{Channel, GridSpec};
 use crate::math::quadrature::Integral;
 use crate::sample::{LayerBuffers, LayerSampler, Selection};
 use crate::scene::{GridStep, Scene};
 use crate::work::in_parts;
-use crate::{Error, sample};
 use glam::DVec3;
 
 /// What a fraction may be off by, where a surface passes through its voxel: that of voxels that have to be divided.
@@ -121,7 +121,7 @@ fn at(scene: &Scene, resolution: u32) -> Scene {
 
 /// What is studied of each layer.
 fn studied() -> Selection {
-    Selection::of(&[sample::Channel::Fraction, sample::Channel::Sdf], None)
+    Selection::of(&[Channel::Fraction, Channel::Sdf], None)
 }
 
 /// As [`study`], by so many workers at most: each holds a layer.

@@ -7,7 +7,7 @@ use super::fraction::{FractionSampler, FractionScratch};
 use super::memory::Stream;
 use super::radial::{LayerOut, Writing};
 use super::tally::{Certainty, FRACTION_ERROR, Tally};
-use crate::grid::GridSpec;
+use crate::grid::{Channel, Channels, GridSpec};
 use crate::math::Kernel;
 use crate::solid::{Assembly, Body, Part, Scalar};
 use rayon::prelude::*;
@@ -16,28 +16,11 @@ use std::sync::Arc;
 /// Bytes of the parts of one divided voxel: 20 000 of up to 1.2 kB.
 const DIVISION: u64 = 24 << 20;
 
-/// A quantity sampled on a grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Channel {
-    /// 1 where the voxel's centre is inside, else 0.
-    Occupancy,
-    /// The share of the voxel that is inside.
-    Fraction,
-    /// Signed distance of the voxel's centre, negative inside.
-    Sdf,
-    /// Material id at the voxel's centre, 0 outside.
-    Material,
-}
-
 /// Which channels are wanted, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Selection {
-    /// Fill [`LayerBuffers::fraction`].
-    pub fraction: bool,
-    /// Fill [`LayerBuffers::sdf`].
-    pub sdf: bool,
-    /// Fill [`LayerBuffers::material`].
-    pub material: bool,
+    /// What is filled of [`LayerBuffers`]; occupancy always is, as the others rest on it.
+    pub channels: Channels,
     /// Clamp distances to ± this length, in scene units.
     pub band: Option<f64>,
     /// Error allowed to a fraction, in voxels; [`FRACTION_ERROR`] without it.
@@ -45,17 +28,20 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// The selection of those channels. Occupancy is always sampled: the others rest on it.
+    /// The selection of those channels.
     #[must_use]
     pub fn of(channels: &[Channel], band: Option<f64>) -> Self {
-        let has = |c| channels.contains(&c);
         Self {
-            fraction: has(Channel::Fraction),
-            sdf: has(Channel::Sdf),
-            material: has(Channel::Material),
+            channels: channels.iter().copied().collect(),
             band,
             fraction_error: None,
         }
+    }
+
+    /// Whether a channel is wanted.
+    #[must_use]
+    pub fn has(&self, channel: Channel) -> bool {
+        self.channels.has(channel)
     }
 }
 
@@ -161,7 +147,7 @@ impl<'a> LayerSampler<'a> {
         selection: Selection,
     ) -> Self {
         Self::with_bodies(kernel, assembly, grid, selection, |body| {
-            BodySampler::new(kernel, body, grid, selection.sdf)
+            BodySampler::new(kernel, body, grid, selection.has(Channel::Sdf))
         })
     }
 
@@ -181,7 +167,7 @@ impl<'a> LayerSampler<'a> {
         selection: Selection,
         sampler: impl Fn(&Arc<Body>) -> BodySampler + Send + Sync,
     ) -> Self {
-        let fractions = selection.fraction.then(|| {
+        let fractions = selection.has(Channel::Fraction).then(|| {
             FractionSampler::new(
                 assembly,
                 grid,
@@ -190,11 +176,12 @@ impl<'a> LayerSampler<'a> {
         });
         let mut materials = assembly.added().map(Part::material);
         let first = materials.next();
-        let (surfaces, layered) = if selection.material && materials.any(|m| Some(m) != first) {
-            material_surfaces(assembly)
-        } else {
-            (assembly.bodies().to_vec(), Vec::new())
-        };
+        let (surfaces, layered) =
+            if selection.has(Channel::Material) && materials.any(|m| Some(m) != first) {
+                material_surfaces(assembly)
+            } else {
+                (assembly.bodies().to_vec(), Vec::new())
+            };
         let bodies = assembly.bodies().par_iter().map(sampler);
         Self {
             cancel: None,
@@ -237,18 +224,18 @@ impl<'a> LayerSampler<'a> {
             None => assembly.bodies().len() as u64,
         };
         (voxels / 8).saturating_mul(1 + 2 * bodies)
-            + voxels.saturating_mul(each(selection.fraction, 8 * bodies))
+            + voxels.saturating_mul(each(selection.has(Channel::Fraction), 8 * bodies))
             + voxels
-                * (1 + each(selection.fraction, 4)
-                    + each(selection.sdf, 4)
-                    + each(selection.material, 4))
+                * (1 + each(selection.has(Channel::Fraction), 4)
+                    + each(selection.has(Channel::Sdf), 4)
+                    + each(selection.has(Channel::Material), 4))
     }
 
     /// Bytes that dividing a voxel takes, where several bodies may touch it and fractions are wanted: as many parts as
     /// it may be divided into, of some kilobyte each.
     #[must_use]
     pub fn bytes_of_division(assembly: &Assembly, selection: &Selection) -> u64 {
-        if selection.fraction && assembly.single_index().is_none() {
+        if selection.has(Channel::Fraction) && assembly.single_index().is_none() {
             DIVISION
         } else {
             0
@@ -259,7 +246,7 @@ impl<'a> LayerSampler<'a> {
     /// bodies, which an [`exact`](Self::exact) sampler does without.
     #[must_use]
     pub fn bytes_per_thread(&self) -> u64 {
-        if self.single.is_some() || !(self.selection.sdf && self.fills_distance()) {
+        if self.single.is_some() || !(self.selection.has(Channel::Sdf) && self.fills_distance()) {
             return 0;
         }
         (self.grid.layer_len() as u64).saturating_mul(4 * self.bodies.len() as u64)
@@ -271,9 +258,12 @@ impl<'a> LayerSampler<'a> {
         let wanted = |on: bool| if on { n } else { 0 };
         // Every value is written: what is left of the last layer need not be cleared.
         out.occupancy.resize(n, 0);
-        out.fraction.resize(wanted(self.selection.fraction), 0.0);
-        out.sdf.resize(wanted(self.selection.sdf), 0.0);
-        out.material.resize(wanted(self.selection.material), 0);
+        out.fraction
+            .resize(wanted(self.selection.has(Channel::Fraction)), 0.0);
+        out.sdf
+            .resize(wanted(self.selection.has(Channel::Sdf)), 0.0);
+        out.material
+            .resize(wanted(self.selection.has(Channel::Material)), 0);
         out.scalars.resize(self.scalars.len(), Vec::new());
         for values in &mut out.scalars {
             // But for those of voxels outside.
@@ -288,13 +278,17 @@ impl<'a> LayerSampler<'a> {
         self.find_sides(k, scratch);
         out.inside = bits::count(&scratch.inside);
         bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
-        let measured = self.selection.sdf && self.fills_distance();
+        let measured = self.selection.has(Channel::Sdf) && self.fills_distance();
         if measured {
             self.find_distances(k, scratch, &mut out.sdf, None);
             self.count_certainty(k, scratch, &out.sdf, &mut out.tally.certainty);
         }
         let fractions = self.find_fractions(k, out);
-        self.rows(k, [self.selection.sdf && !measured, fractions], out);
+        self.rows(
+            k,
+            [self.selection.has(Channel::Sdf) && !measured, fractions],
+            out,
+        );
     }
 
     /// Finds the fractions of layer `k`, or those of each body; whether rows are still to be filled.

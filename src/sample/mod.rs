@@ -53,6 +53,6 @@ mod volume;
 mod wedge;
 
 pub(crate) use layer::stored;
-pub use layer::{Cancel, Channel, LayerBuffers, LayerSampler, Selection};
+pub use layer::{Cancel, LayerBuffers, LayerSampler, Selection};
 pub use tally::{Certainty, FRACTION_ERROR, Loose, Tally, Ways};
 pub use volume::{filled, fraction, material, occupancy, occupancy_bits, signed_distance};

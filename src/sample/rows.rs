@@ -3,6 +3,7 @@
 
 use super::layer::{LayerBuffers, LayerSampler, stored};
 use super::tally::Certainty;
+use crate::grid::Channel;
 use crate::math::Side;
 use crate::solid::{Cuts, LayerCuts, Reaches, Row, signed};
 
@@ -22,8 +23,10 @@ impl LayerSampler<'_> {
         let fractions = self.fractions.as_ref().filter(|_| fractions);
         let sides = distances
             || fractions.is_some_and(|f| f.needs_sides(shares))
-            || self.selection.material && !self.layered.is_empty();
-        let others = fractions.is_some() || self.selection.material || !self.scalars.is_empty();
+            || self.selection.has(Channel::Material) && !self.layered.is_empty();
+        let others = fractions.is_some()
+            || self.selection.has(Channel::Material)
+            || !self.scalars.is_empty();
         if !(sides || others) {
             return;
         }
@@ -45,7 +48,7 @@ impl LayerSampler<'_> {
             }
             let range = j * nx..(j + 1) * nx;
             let occupancy = &out.occupancy[range.clone()];
-            if self.selection.material {
+            if self.selection.has(Channel::Material) {
                 let material = &mut out.material[range.clone()];
                 self.material_row(j, k, &scratch.sides, occupancy, material);
                 out.tally.count_materials(material);

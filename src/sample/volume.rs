@@ -3,7 +3,7 @@
 use super::layer::{LayerBuffers, LayerSampler, Selection};
 use super::memory::advise_large_pages;
 use super::radial::LayerOut;
-use crate::grid::{BitVolume, GridSpec, Volume};
+use crate::grid::{BitVolume, Channel, GridSpec, Volume};
 use crate::scene::Scene;
 use crate::solid::Assembly;
 use rayon::prelude::*;
@@ -81,13 +81,14 @@ impl LayerSampler<'_> {
     }
 
     /// Fills a buffer of one value for each voxel with the signed distances of the whole grid, in parallel. The
-    /// sampler's selection must have [`Selection::sdf`].
+    /// sampler's selection must have [`Channel::Sdf`].
     ///
     /// # Panics
     /// When `out` does not have one value for each voxel, or the selection has no distances.
     pub fn fill_signed_distance(&self, out: &mut [f32]) {
         self.check_length(out.len());
-        assert!(self.selection().sdf, "a selection with distances");
+        let selection = self.selection();
+        assert!(selection.has(Channel::Sdf), "a selection with distances");
         if !self.fills_distance() {
             self.layers_into(out, |b| &b.sdf);
             return;
@@ -160,10 +161,7 @@ pub fn fraction(scene: &Scene, grid: &GridSpec) -> Result<Volume<f32>, crate::Er
     Ok(whole(
         scene.assembly(),
         grid,
-        Selection {
-            fraction: true,
-            ..Selection::default()
-        },
+        Selection::of(&[Channel::Fraction], None),
         |b| &b.fraction,
     ))
 }
@@ -174,10 +172,7 @@ pub fn fraction(scene: &Scene, grid: &GridSpec) -> Result<Volume<f32>, crate::Er
 /// [`crate::Error`] when the volume does not fit the address space.
 pub fn signed_distance(scene: &Scene, grid: &GridSpec) -> Result<Volume<f32>, crate::Error> {
     fits(grid, 4)?;
-    let selection = Selection {
-        sdf: true,
-        ..Selection::default()
-    };
+    let selection = Selection::of(&[Channel::Sdf], None);
     let sampler = LayerSampler::new(scene.assembly(), grid, selection);
     Ok(fresh(grid, |data| sampler.fill_signed_distance(data)))
 }
@@ -191,10 +186,7 @@ pub fn material(scene: &Scene, grid: &GridSpec) -> Result<Volume<u32>, crate::Er
     Ok(whole(
         scene.assembly(),
         grid,
-        Selection {
-            material: true,
-            ..Selection::default()
-        },
+        Selection::of(&[Channel::Material], None),
         |b| &b.material,
     ))
 }

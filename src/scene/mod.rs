@@ -57,8 +57,8 @@ pub use limits::{
     MAX_SOLIDS, MAX_TABLES, MAX_TEXT_BYTES, MAX_VOXELS, MIN_ASPECT, MIN_MAGNITUDE, MIN_SINE,
 };
 pub use model::{
-    Across, AxisModel, Boundary, ChannelModel, ChannelName, ChannelProblem, CompressionName,
-    CurveForm, CurveKind, CurveModel, FieldModel, Fill, FormatName, GridModel, GridStep, Operation,
+    Across, AxisModel, Boundary, ChannelModel, ChannelProblem, CompressionName, CurveForm,
+    CurveKind, CurveModel, FieldModel, Fill, FormatName, GridModel, GridStep, Operation,
     OutputModel, PARAMETERS, PatchModel, PlaceStep, PointModel, ProfileModel, SceneModel,
     SectionModel, SolidKind, SolidModel, TurnModel, Units, VolumeModel, VolumeSource,
 };

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use super::error::{Place, SceneError, Sources};
 use super::keys::nearest;
+use crate::grid::Channel;
 use crate::solid::Shape;
 
 /// An enum whose variants have names in scene files.
@@ -57,25 +58,11 @@ named! {
     }
 }
 
-named! {
-    /// A value sampled at every voxel.
-    ChannelName {
-        /// 1 where the voxel's centre is inside, else 0.
-        Occupancy = "occupancy",
-        /// The part of the voxel's volume that is inside.
-        Fraction = "fraction",
-        /// Signed distance of the voxel's centre, negative inside.
-        Sdf = "sdf",
-        /// The material's id, 0 where empty.
-        Material = "material",
-    }
-}
-
 /// A channel of the output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChannelModel {
     /// What every scene has.
-    Known(ChannelName),
+    Known(Channel),
     /// A parameter or a field of the volumes, by name.
     Scalar(String),
 }
@@ -232,11 +219,11 @@ impl SceneModel {
         let scalars = self.scalar_names();
         let mut found: Vec<ChannelModel> = Vec::new();
         for (index, &name) in names.iter().enumerate() {
-            let channel = match ChannelName::from_name(name) {
+            let channel = match Channel::from_name(name) {
                 Some(known) => ChannelModel::Known(known),
                 None if scalars.contains(&name) => ChannelModel::Scalar(name.to_owned()),
                 None => {
-                    let known = ChannelName::ALL.iter().map(|c| c.name());
+                    let known = Channel::ALL.iter().map(|c| c.name());
                     let all: Vec<&str> = known.chain(scalars.iter().copied()).collect();
                     return Err((
                         index,

@@ -10,8 +10,8 @@ use super::fields::{
 use super::keys;
 use super::limits::MAX_VOXELS;
 use super::model::{
-    ChannelModel, ChannelName, CompressionName, FormatName, GridModel, GridStep, OutputModel,
-    PARAMETERS, SceneModel, Units,
+    ChannelModel, CompressionName, FormatName, GridModel, GridStep, OutputModel, PARAMETERS,
+    SceneModel, Units,
 };
 use super::points::PointFiles;
 use super::profile::profile;
@@ -19,6 +19,7 @@ use super::reference::reference;
 use super::solid::solids;
 use super::value::{Kind, Value};
 use super::volume::Context;
+use crate::grid::Channel;
 
 /// Reads a scene. Point files are added to `sources`.
 pub(super) fn scene(
@@ -211,9 +212,9 @@ fn grid(value: &Value) -> Result<GridModel, Fault> {
 fn default_output(place: Place) -> OutputModel {
     OutputModel {
         channels: vec![
-            ChannelModel::Known(ChannelName::Occupancy),
-            ChannelModel::Known(ChannelName::Fraction),
-            ChannelModel::Known(ChannelName::Sdf),
+            ChannelModel::Known(Channel::Occupancy),
+            ChannelModel::Known(Channel::Fraction),
+            ChannelModel::Known(Channel::Sdf),
         ],
         formats: vec![FormatName::Exr],
         compression: CompressionName::Auto,

@@ -6,10 +6,9 @@
 use serde_json::{Map, Value, json};
 
 use super::limits::{MAX_DEGREE, MAX_MAGNITUDE, MAX_NAME, MAX_VOXELS, MIN_MAGNITUDE};
-use super::model::{
-    Across, Boundary, ChannelName, CompressionName, Fill, FormatName, Operation, Units,
-};
+use super::model::{Across, Boundary, CompressionName, Fill, FormatName, Operation, Units};
 use super::read::{DEFAULT_PADDING, DEFAULT_RESOLUTION};
+use crate::grid::Channel;
 use crate::math::tolerance::GAP;
 use crate::region::MAX_GAP;
 
@@ -231,7 +230,7 @@ fn grid() -> Value {
 
 /// A channel that every scene has, or the name of a parameter or field of a volume.
 fn channel() -> Value {
-    let mut known = names("A channel.", ChannelName::ALL.iter().map(|n| n.name()));
+    let mut known = names("A channel.", Channel::ALL.iter().map(|n| n.name()));
     known["description"] = json!("A channel of every scene.");
     choice(
         "A channel.",

@@ -7,13 +7,15 @@ use super::fields::{
 use super::keys;
 use super::limits::MAX_DEGREE;
 use super::model::{
-    CurveForm, FieldModel, PatchModel, ProfileModel, SectionModel, VolumeModel, VolumeSource,
+    CurveForm, FieldModel, PARAMETERS, PatchModel, ProfileModel, SectionModel, VolumeModel,
+    VolumeSource,
 };
 use super::points::PointFiles;
 use super::profile::knots;
 use super::solid::{profile, turn};
 use super::value::{Kind, Value};
 use crate::exchange;
+use crate::grid::Channel;
 use crate::nurbs::NurbsVolume;
 use std::path::Path;
 
@@ -234,7 +236,6 @@ fn patch(value: &Value) -> Result<PatchModel, Fault> {
 
 /// Whether a field may have that name; else what is wanted.
 fn check_field_name(name: &str) -> Result<(), String> {
-    const TAKEN: [&str; 7] = ["occupancy", "fraction", "sdf", "material", "u", "v", "w"];
     let letter = |c: char| c.is_ascii_alphabetic() || c == '_';
     let fits = name.len() <= 64
         && name.starts_with(letter)
@@ -242,8 +243,10 @@ fn check_field_name(name: &str) -> Result<(), String> {
     if !fits {
         return Err("letters, digits and _, at most 64, no digit first".to_owned());
     }
-    if TAKEN.contains(&name) {
-        return Err(format!("a name other than {}", TAKEN.join(", ")));
+    let known = Channel::ALL.iter().map(|c| c.name());
+    let taken: Vec<&str> = known.chain(PARAMETERS).collect();
+    if taken.contains(&name) {
+        return Err(format!("a name other than {}", taken.join(", ")));
     }
     Ok(())
 }

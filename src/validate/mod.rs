@@ -19,9 +19,9 @@ pub use page::{Heading, page};
 pub use votes::{Ballot, Disagreement, PartVote};
 
 use crate::Error;
-use crate::grid::GridSpec;
+use crate::grid::{Channel, GridSpec};
 use crate::mesh::{Mesh, MeshError, MeshTree, tessellate};
-use crate::sample::{Channel, LayerBuffers, LayerSampler, Selection};
+use crate::sample::{LayerBuffers, LayerSampler, Selection};
 use crate::scene::Scene;
 use crate::work::in_parts;
 use field::{Field, Stencil};

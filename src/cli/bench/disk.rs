@@ -6,10 +6,8 @@ use super::{Job, selection};
 use crate::cli::failure::Failure;
 use crate::cli::interrupt;
 use crate::cli::output;
-use crate::grid::GridSpec;
-use crate::io::exr::{
-    Compression, LayerChannels, LayerEncoder, SampleKind, decode_layer, layer_attributes,
-};
+use crate::grid::{Channel, GridSpec};
+use crate::io::exr::{Compression, LayerEncoder, Samples, decode_layer, layer_attributes};
 use crate::io::scratch::ScratchDirectory;
 use crate::io::stack::{ChannelSpec, StackOptions, StackSummary, StackWriter, largest_stack_bytes};
 use crate::io::{available_bytes, verify_stack};
@@ -29,12 +27,11 @@ const SAMPLED_BYTES: usize = 1 << 28;
 const VOXEL_BYTES: u64 = 6;
 
 /// The channels of a layer that are written.
-fn channels(buffers: &LayerBuffers) -> LayerChannels<'_> {
-    LayerChannels {
-        occupancy: Some(&buffers.occupancy),
-        sdf: Some(&buffers.sdf),
-        ..LayerChannels::default()
-    }
+fn channels(buffers: &LayerBuffers) -> [(&'static str, Samples<'_>); 2] {
+    [
+        ("occupancy", Samples::Half(&buffers.occupancy)),
+        ("sdf", Samples::Float(&buffers.sdf)),
+    ]
 }
 
 impl Job<'_> {
@@ -82,7 +79,7 @@ impl Job<'_> {
                 .unwrap_or_else(std::sync::PoisonError::into_inner);
             let list = channels(buffers);
             let bytes = encoder
-                .encode([nx, ny], &list.list(), &attributes, Compression::None)
+                .encode([nx, ny], &list, &attributes, Compression::None)
                 .map_err(failed)?;
             done(bytes)
         };
@@ -159,8 +156,8 @@ impl Job<'_> {
         let grid = GridSpec::new([nx, ny, layers], self.grid.origin(), self.grid.spacing())
             .map_err(crate::Error::from)?;
         let specs = vec![
-            ChannelSpec::named("occupancy", SampleKind::Half, "m"),
-            ChannelSpec::named("sdf", SampleKind::Float, "m"),
+            ChannelSpec::of(Channel::Occupancy, "m"),
+            ChannelSpec::of(Channel::Sdf, "m"),
         ];
         // The stack and its plain twin.
         let needed = 2 * largest_stack_bytes(&grid, &specs);

@@ -14,7 +14,7 @@ use super::arguments::{Bench, Common, Step};
 use super::failure::Failure;
 use super::interrupt;
 use super::output::Console;
-use crate::grid::GridSpec;
+use crate::grid::{Channel, GridSpec};
 use crate::math::Kernel;
 use crate::sample::{LayerBuffers, LayerSampler, Selection};
 use crate::scene::Scene;
@@ -103,12 +103,11 @@ struct Job<'a> {
 
 /// What is sampled for a stage.
 fn selection(sdf: bool, fraction: bool, band: Option<f64>) -> Selection {
-    Selection {
-        sdf,
-        fraction,
-        band,
-        ..Selection::default()
-    }
+    let wanted = [(Channel::Sdf, sdf), (Channel::Fraction, fraction)];
+    let channels: Vec<Channel> = (wanted.into_iter())
+        .filter_map(|(channel, is_wanted)| is_wanted.then_some(channel))
+        .collect();
+    Selection::of(&channels, band)
 }
 
 fn interrupted() -> bool {
@@ -213,12 +212,12 @@ impl Job<'_> {
         if (layer.occupancy[n] != 0) != inside {
             return false;
         }
-        if !(selection.sdf || selection.fraction) {
+        if !(selection.has(Channel::Sdf) || selection.has(Channel::Fraction)) {
             return true;
         }
         let exact = assembly.signed_distance(at);
         let spacing = self.grid.spacing();
-        if selection.fraction {
+        if selection.has(Channel::Fraction) {
             // A ball around the voxel that the surface does not reach.
             let clear = exact.abs() > 0.5 * spacing.length() * (1.0 + 1e-9);
             let share = layer.fraction[n];

@@ -9,6 +9,8 @@ use std::str::FromStr;
 use ::exr::prelude::Compression as ExrCompression;
 use serde::{Deserialize, Serialize};
 
+use crate::grid::Channel;
+
 /// How the pixels of a slice are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -88,7 +90,8 @@ impl Compression {
         if self != Self::Auto {
             return self;
         }
-        let compressible = |name: &str| matches!(name, "occupancy" | "fraction" | "material");
+        let known = |name: &str| Channel::from_name(name);
+        let compressible = |name: &str| known(name).is_some_and(Channel::is_mostly_constant);
         if channels.into_iter().all(compressible) {
             Self::Rle
         } else {
@@ -142,8 +145,9 @@ impl FromStr for Compression {
 #[cfg(test)]
 mod tests {
     use super::super::testing::attributes;
-    use super::super::{LayerChannels, LayerEncoder};
+    use super::super::{LayerEncoder, Samples};
     use super::*;
+    use crate::grid::Channel;
     use crate::sample::{LayerBuffers, LayerSampler, Selection};
     use crate::scene::Scene;
 
@@ -169,12 +173,7 @@ mod tests {
         let scene = Scene::load_with(path, &["grid.resolution=512".to_owned()]).unwrap();
         let grid = scene.grid().unwrap();
         let [nx, ny, nz] = grid.dims();
-        let selection = Selection {
-            fraction: true,
-            sdf: true,
-            material: true,
-            ..Selection::default()
-        };
+        let selection = Selection::of(&[Channel::Fraction, Channel::Sdf, Channel::Material], None);
         let sampler = LayerSampler::new(scene.assembly(), &grid, selection);
         let layers: Vec<LayerBuffers> = (1..6)
             .map(|i| {
@@ -194,13 +193,12 @@ mod tests {
             for compression in &Compression::ALL[..6] {
                 let (mut samples, mut file, mut seconds) = (0, 0, 0.0);
                 for layer in &layers {
-                    let mut list = LayerChannels {
-                        occupancy: Some(&layer.occupancy),
-                        fraction: Some(&layer.fraction),
-                        sdf: Some(&layer.sdf),
-                        material: Some(&layer.material),
-                    }
-                    .list();
+                    let mut list = vec![
+                        ("occupancy", Samples::Half(&layer.occupancy)),
+                        ("fraction", Samples::Float(&layer.fraction)),
+                        ("sdf", Samples::Float(&layer.sdf)),
+                        ("material", Samples::Uint(&layer.material)),
+                    ];
                     list.retain(|c| wanted.contains(&c.0));
                     samples += list
                         .iter()

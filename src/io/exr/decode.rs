@@ -247,8 +247,7 @@ mod tests {
     fn damaged_files_are_refused_without_panic() {
         let layer = Layer::ball(SIZE);
         for compression in Compression::ALL {
-            let bytes =
-                encode_layer(SIZE, &layer.channels().list(), &attributes(), compression).unwrap();
+            let bytes = encode_layer(SIZE, &layer.channels(), &attributes(), compression).unwrap();
             for end in 0..bytes.len() {
                 assert!(decode_layer(&bytes[..end]).is_err(), "cut at {end}");
             }

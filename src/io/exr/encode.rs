@@ -288,10 +288,10 @@ impl Digest {
 /// [`ExrError`] when a channel's name or length is wrong or the layer does not fit the format.
 ///
 /// ```
-/// # use voxlathe::io::exr::{Attributes, Compression, LayerChannels, decode_layer, encode_layer};
+/// # use voxlathe::io::exr::{Attributes, Compression, Samples, decode_layer, encode_layer};
 /// let sdf = [-0.5_f32, 0.25, 1.0, 2.0, 3.0, 4.0];
-/// let channels = LayerChannels { sdf: Some(&sdf), ..Default::default() };
-/// let bytes = encode_layer([3, 2], &channels.list(), &Attributes::new(), Compression::Zip)?;
+/// let channels = [("sdf", Samples::Float(&sdf))];
+/// let bytes = encode_layer([3, 2], &channels, &Attributes::new(), Compression::Zip)?;
 /// assert_eq!(decode_layer(&bytes)?.channel("sdf").unwrap().to_f32(), sdf);
 /// # Ok::<(), voxlathe::io::exr::ExrError>(())
 /// ```

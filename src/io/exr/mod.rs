@@ -34,7 +34,7 @@ pub use self::decode::{DecodedLayer, DecodedSamples, decode_layer};
 pub use self::encode::{LayerEncoder, encode_layer};
 pub use self::error::ExrError;
 pub(crate) use self::header::check_channel_name;
-pub use self::samples::{LayerChannels, SampleKind, Samples};
+pub use self::samples::{SampleKind, Samples};
 pub use super::stack::{StackChannel, write_stack};
 
 /// What the sign of the distance means, as `voxlathe:signConvention` says it.

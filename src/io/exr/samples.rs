@@ -1,11 +1,13 @@
 //! The samples of a layer on their way into a file.
 //!
-//! `occupancy` is HALF, `fraction` and `sdf` are FLOAT, `material` is UINT; x fastest, then y.
+//! Masks are HALF, real numbers FLOAT, ids UINT; x fastest, then y.
 
 use std::ops::Range;
 
 use ::exr::prelude::SampleType;
 use serde::{Deserialize, Serialize};
+
+use crate::grid::Stored;
 
 /// The samples of one channel in one layer, x fastest, then y.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,34 +120,13 @@ impl SampleKind {
     }
 }
 
-/// The sampled channels of one layer; those that are `None` are not written.
-///
-/// Each slice holds nx * ny samples, x fastest, then y.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LayerChannels<'a> {
-    /// 1 where the voxel centre is inside, else 0.
-    pub occupancy: Option<&'a [u8]>,
-    /// Inside part of the voxel's volume, 0 to 1.
-    pub fraction: Option<&'a [f32]>,
-    /// Signed distance at the voxel centre, in scene units, negative inside.
-    pub sdf: Option<&'a [f32]>,
-    /// Id of the material at the voxel centre, 0 where empty.
-    pub material: Option<&'a [u32]>,
-}
-
-impl<'a> LayerChannels<'a> {
-    /// The channels that are present, with their names.
-    #[must_use]
-    pub fn list(&self) -> Vec<(&'static str, Samples<'a>)> {
-        [
-            self.occupancy.map(|s| ("occupancy", Samples::Half(s))),
-            self.fraction.map(|s| ("fraction", Samples::Float(s))),
-            self.sdf.map(|s| ("sdf", Samples::Float(s))),
-            self.material.map(|s| ("material", Samples::Uint(s))),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+impl From<Stored> for SampleKind {
+    fn from(stored: Stored) -> Self {
+        match stored {
+            Stored::Mask => Self::Half,
+            Stored::Real => Self::Float,
+            Stored::Id => Self::Uint,
+        }
     }
 }
 

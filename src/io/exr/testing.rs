@@ -1,6 +1,6 @@
 //! Layers for the tests.
 
-use super::{Attributes, LayerChannels, layer_attributes};
+use super::{Attributes, Samples, layer_attributes};
 use crate::grid::GridSpec;
 use glam::DVec3;
 
@@ -38,13 +38,13 @@ impl Layer {
         }
     }
 
-    pub(super) fn channels(&self) -> LayerChannels<'_> {
-        LayerChannels {
-            occupancy: Some(&self.occupancy),
-            fraction: Some(&self.fraction),
-            sdf: Some(&self.sdf),
-            material: Some(&self.material),
-        }
+    pub(super) fn channels(&self) -> [(&'static str, Samples<'_>); 4] {
+        [
+            ("occupancy", Samples::Half(&self.occupancy)),
+            ("fraction", Samples::Float(&self.fraction)),
+            ("sdf", Samples::Float(&self.sdf)),
+            ("material", Samples::Uint(&self.material)),
+        ]
     }
 }
 

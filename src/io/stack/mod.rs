@@ -30,14 +30,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::directory::{StackDirectory, WrittenFile};
 use super::error::IoError;
 use super::exr::{
-    Compression, ExrError, LayerChannels, LayerEncoder, SIGN_CONVENTION, SampleKind, Samples,
-    check_channel_name, layer_attributes,
+    Compression, ExrError, LayerEncoder, SIGN_CONVENTION, SampleKind, Samples, check_channel_name,
+    layer_attributes,
 };
 use super::manifest::{
     ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, MaterialVolume,
     SCHEMA, WriteScene, slice_name,
 };
-use crate::grid::GridSpec;
+use crate::grid::{Channel, GridSpec};
 
 /// A channel that each layer of a stack has.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,20 +58,24 @@ impl ChannelSpec {
     /// * `units`: label of the scene's lengths, the unit of `sdf`.
     #[must_use]
     pub fn named(name: &str, kind: SampleKind, units: &str) -> Self {
-        let meaning = match name {
-            "occupancy" => "1 where the voxel centre is inside the solid or on its surface, else 0",
-            "fraction" => "part of the voxel's volume that is inside the solid",
-            "sdf" => "distance from the voxel centre to the surface, negative inside",
-            "material" => "id of the material at the voxel centre, 0 where empty",
-            "u" | "v" | "w" => "parameter of the volume at the voxel centre, 0 outside",
+        let known = Channel::from_name(name);
+        let meaning = match (known, name) {
+            (Some(channel), _) => channel.meaning(),
+            (None, "u" | "v" | "w") => "parameter of the volume at the voxel centre, 0 outside",
             _ => "values at the voxel centre, 0 outside where they are fields of volumes",
         };
         Self {
             name: name.into(),
             kind,
             meaning: meaning.into(),
-            unit: (name == "sdf").then(|| units.into()),
+            unit: known.and_then(|channel| channel.unit().label(units)),
         }
+    }
+
+    /// A quantity of every scene, with lengths labelled `units`.
+    #[must_use]
+    pub fn of(channel: Channel, units: &str) -> Self {
+        Self::named(channel.name(), channel.stored().into(), units)
     }
 }
 
@@ -221,21 +225,14 @@ impl StackWriter {
         self.compression
     }
 
-    /// Writes layer `k`. Threads may call this at the same time, with the layers in any order.
+    /// Writes layer `k` from samples by channel name. Threads may call this at the same time, with the layers in any
+    /// order.
     ///
     /// # Errors
     /// [`IoError::LayerOutside`], [`IoError::WrittenTwice`], [`IoError::Mismatch`] or
     /// [`IoError::Exr`] when the layer is not one of the stack's, [`IoError::Write`] when the
     /// system refuses.
-    pub fn write_layer(&self, k: usize, layer: &LayerChannels<'_>) -> Result<(), IoError> {
-        self.write_samples(k, &layer.list())
-    }
-
-    /// Writes layer `k` from samples by channel name; see [`write_layer`](Self::write_layer).
-    ///
-    /// # Errors
-    /// As [`write_layer`](Self::write_layer).
-    pub fn write_samples(&self, k: usize, layer: &[(&str, Samples<'_>)]) -> Result<(), IoError> {
+    pub fn write_layer(&self, k: usize, layer: &[(&str, Samples<'_>)]) -> Result<(), IoError> {
         let [nx, ny, layers] = self.grid.dims();
         if k >= layers {
             return Err(IoError::LayerOutside {
@@ -595,12 +592,12 @@ pub(super) mod tests {
         let (occupancy, fraction, sdf, material) = layer_values(k);
         writer.write_layer(
             k,
-            &LayerChannels {
-                occupancy: Some(&occupancy),
-                fraction: Some(&fraction),
-                sdf: Some(&sdf),
-                material: Some(&material),
-            },
+            &[
+                ("occupancy", Samples::Half(&occupancy)),
+                ("fraction", Samples::Float(&fraction)),
+                ("sdf", Samples::Float(&sdf)),
+                ("material", Samples::Uint(&material)),
+            ],
         )
     }
 
@@ -741,7 +738,7 @@ pub(super) mod tests {
         .unwrap();
         let mut sdf = vec![1.0_f32; 91];
         let text = |k: usize, layer: &[(&str, Samples<'_>)]| {
-            let error = writer.write_samples(k, layer).unwrap_err().to_string();
+            let error = writer.write_layer(k, layer).unwrap_err().to_string();
             error.replace(&dir.path().display().to_string(), "out")
         };
         assert_eq!(
@@ -770,13 +767,13 @@ pub(super) mod tests {
         );
         sdf[8] = f32::INFINITY;
         let layer = [("sdf", Samples::Float(&sdf))];
-        writer.write_samples(0, &layer).unwrap();
+        writer.write_layer(0, &layer).unwrap();
         assert_eq!(
             text(0, &layer),
             "out/slice-0000.exr was written twice; each file of a stack has one writer"
         );
         for k in 1..5 {
-            writer.write_samples(k, &layer).unwrap();
+            writer.write_layer(k, &layer).unwrap();
         }
         let manifest = writer.finish(StackSummary::default()).unwrap();
         assert_eq!(

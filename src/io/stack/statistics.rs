@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use super::super::exr::Samples;
+use crate::grid::{Channel, Stored};
 
 /// Independent accumulators: four of SSE's registers, or one of AVX-512's.
 const LANES: usize = 16;
@@ -20,6 +21,10 @@ pub(in super::super) struct Statistics {
     /// Of `fraction`.
     pub(in super::super) sum: f64,
     pub(super) infinite: u64,
+}
+
+fn stored_as(name: &str) -> Option<Stored> {
+    Channel::from_name(name).map(Channel::stored)
 }
 
 impl Statistics {
@@ -81,12 +86,12 @@ impl Statistics {
         }
         let min = values.iter().fold(u8::MAX, |a, &v| a.min(v));
         let max = values.iter().fold(0, |a, &v| a.max(v));
-        if name == "occupancy"
+        if stored_as(name) == Some(Stored::Mask)
             && max > 1
             && let Some(n) = values.iter().position(|&v| v > 1)
         {
             return Err(format!(
-                "occupancy of {} is {}; it must be 0 or 1",
+                "{name} of {} is {}; it must be 0 or 1",
                 place(n),
                 values[n]
             ));
@@ -124,17 +129,21 @@ impl Statistics {
             max = finite().fold(f32::NEG_INFINITY, f32::max);
         }
         self.include(f64::from(min), f64::from(max));
-        if name == "fraction" {
-            let wrong = |v: &f32| !(0.0..=1.0).contains(v);
+        if let Some(range) = Channel::from_name(name).and_then(Channel::range) {
+            let wrong = |v: &f32| !range.contains(v);
             if (wrong(&min) || wrong(&max) || !all_finite)
                 && let Some(n) = values.iter().position(wrong)
             {
                 return Err(format!(
-                    "fraction of {} is {}; it must be between 0 and 1",
+                    "{name} of {} is {}; it must be between {} and {}",
                     place(n),
-                    values[n]
+                    values[n],
+                    range.start(),
+                    range.end()
                 ));
             }
+        }
+        if Channel::from_name(name) == Some(Channel::Fraction) {
             for row in values.chunks(width) {
                 self.sum += sum(row);
             }

@@ -110,7 +110,7 @@ pub fn write_stack<C: StackChannel + ?Sized>(
             .iter()
             .map(|(name, volume)| (*name, volume.layer(k)))
             .collect();
-        writer.write_samples(k, &layer)
+        writer.write_layer(k, &layer)
     })?;
     writer.finish(StackSummary::default())
 }

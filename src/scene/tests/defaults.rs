@@ -1,6 +1,7 @@
 //! Scenes that are read, and what is filled in.
 
 use super::*;
+use crate::grid::Channel;
 
 #[test]
 fn the_smallest_scene_gets_every_default() {
@@ -11,9 +12,9 @@ fn the_smallest_scene_gets_every_default() {
     assert_eq!(
         scene.output.channels,
         [
-            ChannelModel::Known(ChannelName::Occupancy),
-            ChannelModel::Known(ChannelName::Fraction),
-            ChannelModel::Known(ChannelName::Sdf)
+            ChannelModel::Known(Channel::Occupancy),
+            ChannelModel::Known(Channel::Fraction),
+            ChannelModel::Known(Channel::Sdf)
         ]
     );
     assert_eq!(scene.output.compression, CompressionName::Auto);

@@ -10,7 +10,7 @@ use half::f16;
 fn every_compression_and_channel_comes_back() {
     let layer = Layer::ball(SIZE);
     for compression in Compression::ALL {
-        let list = layer.channels().list();
+        let list = layer.channels();
         let bytes = encode_layer(SIZE, &list, &attributes(), compression).unwrap();
         let found = decode_layer(&bytes).unwrap();
         assert_eq!(found.size, SIZE);
@@ -50,7 +50,7 @@ fn every_single_channel_and_odd_size_comes_back() {
     for size in [[1, 1], [1, 67], [67, 1], [33, 17]] {
         let layer = Layer::ball(size);
         for compression in Compression::ALL {
-            for (name, samples) in layer.channels().list() {
+            for (name, samples) in layer.channels() {
                 let bytes = encode_layer(size, &[(name, samples)], &Attributes::new(), compression)
                     .unwrap();
                 let found = decode_layer(&bytes).unwrap();
@@ -102,13 +102,7 @@ fn special_floats_keep_their_bits() {
 #[test]
 fn attributes_say_where_the_layer_is() {
     let layer = Layer::ball(SIZE);
-    let bytes = encode_layer(
-        SIZE,
-        &layer.channels().list(),
-        &attributes(),
-        Compression::Zip,
-    )
-    .unwrap();
+    let bytes = encode_layer(SIZE, &layer.channels(), &attributes(), Compression::Zip).unwrap();
     let found = decode_layer(&bytes).unwrap().attributes;
     let text = |s: &str| Attribute::Text(s.into());
     let wanted = [
@@ -140,7 +134,7 @@ fn header_is_sorted_and_chunk_offsets_are_right() {
         many.insert(format!("user:attribute{n:02}"), Attribute::Int(n));
     }
     for compression in Compression::ALL {
-        let bytes = encode_layer([7, 67], &layer.channels().list(), &many, compression).unwrap();
+        let bytes = encode_layer([7, 67], &layer.channels(), &many, compression).unwrap();
         let (entries, end) = header_entries(&bytes).unwrap();
         assert!(entries.len() > 50);
         assert!(
@@ -168,7 +162,7 @@ fn equal_layers_give_equal_bytes() {
     for n in 0..40 {
         many.insert(format!("user:attribute{n:02}"), Attribute::Int(n));
     }
-    let list = layer.channels().list();
+    let list = layer.channels();
     let mut reversed = list.clone();
     reversed.reverse();
     let first = encode_layer(SIZE, &list, &many, Compression::Zip).unwrap();
@@ -193,7 +187,7 @@ fn layer_child() {
         return;
     };
     let layer = Layer::ball(SIZE);
-    let list = layer.channels().list();
+    let list = layer.channels();
     let bytes = encode_layer(SIZE, &list, &attributes(), Compression::Piz).unwrap();
     std::fs::write(file, bytes).unwrap();
 }
@@ -344,7 +338,7 @@ fn bytes_are_those_of_the_crates_writer() {
     for size in [[1, 1], [300, 211], [1, 67], [67, 1], [33, 17], [9000, 3]] {
         let layer = Layer::ball(size);
         let counts: Vec<u8> = (0..size[0] * size[1]).map(|n| (n % 251) as u8).collect();
-        let mut all = layer.channels().list();
+        let mut all = layer.channels().to_vec();
         all.push(("counts", Samples::Half(&counts)));
         for compression in Compression::ALL {
             for list in [&all[..], &all[..1], &all[2..3]] {
@@ -370,7 +364,7 @@ fn bytes_are_those_of_the_crates_writer() {
 #[test]
 fn an_error_in_between_ends_the_layer_and_spoils_nothing() {
     let layer = Layer::ball([300, 211]);
-    let list = layer.channels().list();
+    let list = layer.channels();
     let mut encoder = LayerEncoder::default();
     for compression in [Compression::None, Compression::Zip] {
         let error = encoder
@@ -384,7 +378,7 @@ fn an_error_in_between_ends_the_layer_and_spoils_nothing() {
             .unwrap_err();
         assert_eq!(error, ExrError::NoChannels);
         let small = Layer::ball(SIZE);
-        let list = small.channels().list();
+        let list = small.channels();
         assert_eq!(
             encoder
                 .encode(SIZE, &list, &attributes(), compression)
@@ -402,7 +396,7 @@ fn the_image_reader_agrees() {
     let size = [61, 45];
     let layer = Layer::ball(size);
     for compression in Compression::ALL {
-        let bytes = encode_layer(size, &layer.channels().list(), &attributes(), compression);
+        let bytes = encode_layer(size, &layer.channels(), &attributes(), compression);
         let image = ::exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()
