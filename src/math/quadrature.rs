@@ -77,6 +77,20 @@ pub struct Integral {
     pub error: f64,
 }
 
+/// The place and its derivative at `u` of [0, 1] between two ends, at which of them it moves as the square of the step: a
+/// square root there becomes analytic.
+pub(crate) fn graded([a, b]: [f64; 2], graded: [bool; 2], u: f64) -> (f64, f64) {
+    let (w, v) = (b - a, 1.0 - u);
+    match graded {
+        [false, false] => (a + w * u, w),
+        [true, false] => (a + w * u * u, 2.0 * w * u),
+        [false, true] => (b - w * v * v, 2.0 * w * v),
+        // From the nearer end, for the rounding.
+        [true, true] if u < 0.5 => (a + w * u * u * (3.0 - 2.0 * u), 6.0 * w * u * v),
+        [true, true] => (b - w * v * v * (3.0 - 2.0 * v), 6.0 * w * u * v),
+    }
+}
+
 /// One panel: the Kronrod value over [a, b] and an estimate of its error.
 pub fn panel(f: &mut impl FnMut(f64) -> f64, a: f64, b: f64) -> Integral {
     panel_of(&mut |t| [f(t)], a, b)[0]

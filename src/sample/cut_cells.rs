@@ -7,7 +7,7 @@ use super::fraction::{ESTIMATED, Share, open_terms, reach};
 use super::layer::{LayerBuffers, LayerSampler};
 use super::tally::FRACTION_ERROR;
 use crate::grid::{Channel, Channels};
-use crate::solid::{Crossed, CutCell, Term};
+use crate::solid::{Crossed, CutCell, Term, cut_cell};
 use glam::DVec3;
 
 impl LayerSampler<'_> {
@@ -75,14 +75,22 @@ impl LayerSampler<'_> {
         sides: DVec3,
         error: f64,
     ) -> Option<CutCell> {
-        match terms.as_deref() {
-            None => Some(SOLID),
-            Some([]) => Some(CutCell::default()),
-            Some(open) => {
-                let rows = Crossed::new(self.assembly.bodies(), open, centre, sides)?;
-                Some(rows.cut_cell(ESTIMATED * error))
-            }
+        let open = match terms.as_deref() {
+            None => return Some(SOLID),
+            Some([]) => return Some(CutCell::default()),
+            Some(open) => open,
+        };
+        let bodies = self.assembly.bodies();
+        let tolerance = ESTIMATED * error;
+        // What one turned body cuts has a way of its own.
+        if let [Term { factors }] = open
+            && let [one] = factors.as_slice()
+            && let Some(body) = bodies[one.body].turned_region()
+        {
+            return Some(cut_cell(body, one.complement, centre, sides, tolerance));
         }
+        let rows = Crossed::new(bodies, open, centre, sides)?;
+        Some(rows.cut_cell(tolerance))
     }
 }
 

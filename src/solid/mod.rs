@@ -10,6 +10,7 @@ mod atlas;
 mod block;
 mod body;
 mod bounds;
+mod circles;
 mod coaxial;
 mod composite;
 mod cross_section;
@@ -49,6 +50,7 @@ pub use turn::Turn;
 
 pub(crate) use assembly::{Measured, Reaches, signed};
 pub(crate) use body::{STRETCHES, VoxelShape};
+pub(crate) use circles::cut_cell;
 pub(crate) use crossed::{Crossed, CutCell};
 pub(crate) use fraction::{SNAP, TOLERANCE};
 pub(crate) use nearest::{Nearest, Vicinity};

@@ -13,7 +13,7 @@
 //! by Gauss-Kronrod panels, halved where the estimates are largest.
 
 use super::faces::{Faces, Flux, QUANTITIES, Seen};
-use crate::math::quadrature::{Integral, panel_of};
+use crate::math::quadrature::{Integral, graded, panel_of};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -50,16 +50,7 @@ struct Span {
 impl Span {
     /// The parameter of the sheet and its derivative at `u` of [0, 1].
     fn place(&self, u: f64) -> (f64, f64) {
-        let [a, b] = self.t;
-        let (w, v) = (b - a, 1.0 - u);
-        match self.graded {
-            [false, false] => (a + w * u, w),
-            [true, false] => (a + w * u * u, 2.0 * w * u),
-            [false, true] => (b - w * v * v, 2.0 * w * v),
-            // From the nearer end, for the rounding.
-            [true, true] if u < 0.5 => (a + w * u * u * (3.0 - 2.0 * u), 6.0 * w * u * v),
-            [true, true] => (b - w * v * v * (3.0 - 2.0 * v), 6.0 * w * u * v),
-        }
+        graded(self.t, self.graded, u)
     }
 }
 

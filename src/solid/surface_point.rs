@@ -236,3 +236,203 @@ impl Patches {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::solid::Assembly;
+
+    fn assembly(solids: &str) -> Assembly {
+        let scene = Scene::parse(&format!("schema = 1\n{solids}")).expect("a scene");
+        scene.assembly().clone()
+    }
+
+    /// Points about a solid, most of them near it.
+    fn points(of: &Assembly) -> Vec<DVec3> {
+        let bounds = of.bounds();
+        let mut state = 7_u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            #[allow(clippy::cast_precision_loss, reason = "a share of 2^31")]
+            let share = (state >> 33) as f64 / (1_u64 << 31) as f64;
+            share
+        };
+        let one = |_| {
+            let share = DVec3::new(next(), next(), next()) * 1.6 - 0.3;
+            bounds.min + share * bounds.sides()
+        };
+        (0..2000).map(one).collect()
+    }
+
+    fn seen(of: &Assembly, p: DVec3) -> SurfacePoint {
+        let found = of.surface_point(p, of.contains(p));
+        found.expect("a point of the boundary")
+    }
+
+    /// Holds normals, points and curvatures against those that a formula gives for a point, where it gives some.
+    fn check(solids: &str, wanted: impl Fn(DVec3) -> Option<(DVec3, DVec3, f64, f64)>) {
+        let of = assembly(solids);
+        let mut known = 0;
+        for p in points(&of) {
+            let Some((point, normal, mean, gauss)) = wanted(p) else {
+                continue;
+            };
+            let found = seen(&of, p);
+            known += 1;
+            assert!(
+                found.point.distance(point) <= 1e-10,
+                "{p} {found:?} {point}"
+            );
+            assert!(
+                found.normal.distance(normal) <= 1e-10,
+                "{p} {found:?} {normal}"
+            );
+            assert!(
+                (found.curvature.mean - mean).abs() <= 1e-10,
+                "{p} {found:?} {mean}"
+            );
+            assert!(
+                (found.curvature.gauss - gauss).abs() <= 1e-10,
+                "{p} {found:?} {gauss}"
+            );
+        }
+        assert!(known >= 100, "{known} points of {solids}");
+    }
+
+    #[test]
+    fn closed_forms() {
+        check("solid = [{ kind = 'sphere', radius = 2 }]", |p| {
+            let n = p.normalize();
+            (p.length() > 1e-3).then_some((2.0 * n, n, 0.5, 0.25))
+        });
+        // A torus about a slanted axis.
+        let axis = DVec3::new(1.0, 2.0, 2.0) / 3.0;
+        check(
+            "solid = [{ kind = 'torus', major = 3, minor = 1, axis = { direction = [1, 2, 2] } }]",
+            |p| {
+                let height = axis.dot(p);
+                let flat = p - axis * height;
+                let ring = flat.normalize() * 3.0;
+                let n = (p - ring).normalize();
+                let at = ring + n;
+                let r = (at - axis * axis.dot(at)).length();
+                let across = n.dot(flat.normalize()) / r;
+                let is_clear = flat.length() > 1e-3 && p.distance(ring) > 1e-3;
+                is_clear.then_some((at, n, 0.5 * (1.0 + across), across))
+            },
+        );
+        // The wall of a cylinder and of a cone, away from the ends.
+        check(
+            "solid = [{ kind = 'cylinder', radius = 1, height = 50 }]",
+            |p| {
+                let flat = DVec3::new(p.x, p.y, 0.0);
+                let n = flat.normalize();
+                let is_clear = p.z > 1.0 && p.z < 49.0 && flat.length() > 1e-3;
+                is_clear.then_some((DVec3::new(n.x, n.y, p.z), n, 0.5, 0.0))
+            },
+        );
+        check(
+            "solid = [{ kind = 'cone', radius1 = 4, radius2 = 0, height = 3 }]",
+            |p| {
+                // The wall is 3 r + 4 z = 12.
+                let r = p.x.hypot(p.y);
+                let off = (3.0 * r + 4.0 * p.z - 12.0) / 5.0;
+                let (at_r, at_z) = (r - 0.6 * off, p.z - 0.8 * off);
+                let to_base = p.z;
+                let is_clear = at_r > 0.1 && at_z > 0.1 && r > 1e-3 && -off < to_base;
+                let (x, y) = (p.x / r, p.y / r);
+                is_clear.then_some((
+                    DVec3::new(x * at_r, y * at_r, at_z),
+                    DVec3::new(0.6 * x, 0.6 * y, 0.8),
+                    0.5 * 0.6 / at_r,
+                    0.0,
+                ))
+            },
+        );
+        // What a ball was taken from bends the other way.
+        check(
+            "solid = [{ kind = 'box', size = [6, 6, 6] }, { kind = 'sphere', radius = 2, operation = 'subtract' }]",
+            |p| {
+                let n = p.normalize();
+                let is_clear = p.length() < 2.4 && p.length() > 1e-3;
+                is_clear.then_some((2.0 * n, -n, -0.5, 0.25))
+            },
+        );
+    }
+
+    #[test]
+    fn an_ellipsoid_is_its_formula() {
+        let of = assembly("solid = [{ kind = 'ellipsoid', radii = [1, 2, 3] }]");
+        let squares = DVec3::new(1.0, 4.0, 9.0);
+        for p in points(&of) {
+            let found = seen(&of, p);
+            let q = found.point;
+            assert!(((q * q / squares).element_sum() - 1.0).abs() <= 1e-12);
+            let normal = (q / squares).normalize();
+            assert!(found.normal.distance(normal) <= 1e-9, "{p} {found:?}");
+        }
+        // At the ends of the axes the principal curvatures are a / b² and a / c².
+        let end = seen(&of, DVec3::new(0.0, 0.0, 5.0)).curvature;
+        assert!(
+            (end.mean - 0.5 * (3.0 + 0.75)).abs() <= 1e-12 && (end.gauss - 2.25).abs() <= 1e-12
+        );
+    }
+
+    #[test]
+    fn edges_have_the_distance_s_gradient_and_no_curvature() {
+        let block = assembly("solid = [{ kind = 'box', size = [2, 2, 2] }]");
+        let corner = block.bounds().max;
+        for away in [
+            DVec3::ONE,
+            DVec3::new(1.0, 2.0, 0.0),
+            DVec3::new(3.0, 0.5, 1.0),
+        ] {
+            let along = away.cmpgt(DVec3::ZERO);
+            let found = seen(&block, corner + away);
+            assert!(found.point.distance(corner) <= 1e-12, "{along}");
+            assert!(found.normal.distance(away.normalize()) <= 1e-12);
+            assert_eq!(found.curvature, Curvature::default());
+        }
+        let cylinder = assembly("solid = [{ kind = 'cylinder', radius = 1, height = 1 }]");
+        let found = seen(&cylinder, DVec3::new(2.0, 0.0, 2.0));
+        assert!(found.point.distance(DVec3::new(1.0, 0.0, 1.0)) <= 1e-12);
+        assert_eq!(found.curvature, Curvature::default());
+    }
+
+    /// A net's own derivatives against the solid that the net is.
+    #[test]
+    fn nets_that_are_a_ball() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/volume_torus.toml");
+        let scene = Scene::load(path).expect("a scene that ships");
+        let Body::Patches(nets) = &**scene.assembly().parts()[0].body() else {
+            panic!("a volume of nets");
+        };
+        let turned = nets.turned().expect("a torus");
+        for p in points(scene.assembly()) {
+            let inside = turned.contains(p);
+            let (Some(a), Some(b)) = (nets.surface_point(p), turned.surface_point(p, inside))
+            else {
+                panic!("a point of the boundary");
+            };
+            if a.point.distance(b.point) > 1e-6 {
+                // As far from two places.
+                continue;
+            }
+            let size = scene.assembly().bounds().longest_side();
+            assert!(a.point.distance(b.point) <= 1e-10 * size, "{p} {a:?} {b:?}");
+            assert!(a.normal.cross(b.normal).length() <= 1e-9, "{p} {a:?} {b:?}");
+            let sign = a.normal.dot(b.normal).signum();
+            assert!(
+                (sign * a.curvature.mean - b.curvature.mean).abs() * size <= 1e-7,
+                "{p} {a:?} {b:?}"
+            );
+            assert!(
+                (a.curvature.gauss - b.curvature.gauss).abs() * size * size <= 1e-6,
+                "{p} {a:?} {b:?}"
+            );
+        }
+    }
+}

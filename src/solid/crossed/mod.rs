@@ -38,6 +38,7 @@ use crate::region::Box2;
 use glam::DVec3;
 pub(crate) use kit::CutCell;
 use places::{Family, Places};
+pub(super) use sheet::parameters;
 use sheet::{Affine, Aligned, Bend, Event, Form, Line, Quadric, Sheet, Stretch, Surface};
 use smallvec::SmallVec;
 use std::cell::Cell;
@@ -424,6 +425,9 @@ impl<'a> Crossed<'a> {
             }
         }
         self.sort(&mut events);
+        if S::SIDES {
+            events.sort_by_key(|event| self.reaches_side(event, line.along, true));
+        }
         let (mut known, mut solids) = (0_u64, 0_u64);
         for event in &events {
             let bit = 1 << event.solid;
@@ -441,7 +445,7 @@ impl<'a> Crossed<'a> {
                 solids |= 1 << i;
             }
         }
-        let (chords, visible) = self.chords(&events, solids, S::SIDES);
+        let (chords, visible) = self.chords(&events, solids, line.along, S::SIDES);
         Row {
             sums: S::sum(self, line, &chords),
             events,
@@ -453,24 +457,28 @@ impl<'a> Crossed<'a> {
     /// in before its events.
     ///
     /// * `sides`: whether surface in a side of the voxel ends an interval as surface, where nothing of the solid is beyond.
-    fn chords(&self, events: &[Event], mut solids: u64, sides: bool) -> (Chords, Labels) {
-        let (low, high) = (-0.5 + self.tiny, 0.5 - self.tiny);
+    fn chords(
+        &self,
+        events: &[Event],
+        mut solids: u64,
+        along: usize,
+        sides: bool,
+    ) -> (Chords, Labels) {
         let mut chords = Chords::new();
         let mut visible = Labels::new();
-        let mut rest = events.iter();
+        let mut side = End::Side;
+        let mut rest = events.iter().peekable();
         // Up to the side, and in it.
-        let beyond = |event: &Event| event.place < -0.5 - self.tiny;
-        let (mut side, mut outside) = (End::Side, None);
-        let started = events.iter().take_while(|e| e.place <= low).count();
-        for event in rest.by_ref().take(started) {
-            if sides && !beyond(event) {
-                let before = *outside.get_or_insert_with(|| !self.holds(solids));
-                solids = changed(solids, event);
-                if before && self.holds(solids) {
-                    side = End::Surface(*event);
-                }
-            } else {
-                solids = changed(solids, event);
+        while let Some(event) = rest.next_if(|e| self.reaches_side(e, along, sides) <= 0) {
+            let before = self.holds(solids);
+            solids = changed(solids, event);
+            if sides && self.reaches_side(event, along, sides) == 0 && before != self.holds(solids)
+            {
+                side = if before {
+                    End::Side
+                } else {
+                    End::Surface(*event)
+                };
             }
         }
         let mut open = self.holds(solids).then_some((-0.5, side));
@@ -479,8 +487,8 @@ impl<'a> Crossed<'a> {
         }
         let mut last = End::Side;
         for event in rest {
-            let is_within = event.place < high;
-            if !(is_within || sides && open.is_some() && event.place <= 0.5 + self.tiny) {
+            let place = self.reaches_side(event, along, sides);
+            if place > 2 || place == 2 && !sides {
                 break;
             }
             let before = self.holds(solids);
@@ -489,7 +497,7 @@ impl<'a> Crossed<'a> {
             if now == before {
                 continue;
             }
-            if !is_within {
+            if place == 2 {
                 last = if now { End::Side } else { End::Surface(*event) };
                 continue;
             }
@@ -516,17 +524,52 @@ impl<'a> Crossed<'a> {
         (chords, visible)
     }
 
-    /// A unit normal of the surface that makes an event, at its place on a line.
-    fn normal(&self, event: &Event, line: Line, place: f64) -> DVec3 {
+    /// Where an event is: before the voxel (-1), in its lower side (0), within (1), in its upper side (2) or beyond (3).
+    ///
+    /// * `sides`: whether only flat surface is in a side, as surface that touches it is there along a line; else all that
+    ///   is near is.
+    fn reaches_side(&self, event: &Event, along: usize, sides: bool) -> i32 {
+        let place = event.place;
+        let is_near = (place.abs() - 0.5).abs() <= self.tiny;
+        if is_near && (!sides || self.is_flat(event, along)) {
+            return if place < 0.0 { 0 } else { 2 };
+        }
+        match place {
+            p if p < -0.5 => -1,
+            p if p > 0.5 => 3,
+            _ => 1,
+        }
+    }
+
+    /// The surface that makes an event, and the part it is of.
+    fn surface_of(&self, event: &Event) -> Option<(&Part<'_>, &Surface<'_>)> {
         let mut number = (event.label / BRANCHES) as usize - 1;
         for part in &self.parts {
             if let Some(surface) = part.surfaces.get(number) {
-                let slope = surface.slope(&part.affine, line, place) / self.cell;
-                return slope.normalize_or_zero();
+                return Some((part, surface));
             }
             number -= part.surfaces.len();
         }
-        DVec3::ZERO
+        None
+    }
+
+    /// Whether the surface that makes an event is in a plane across a row.
+    fn is_flat(&self, event: &Event, along: usize) -> bool {
+        let surface = self.surface_of(event).map(|(_, surface)| &surface.sheet);
+        let Some(Sheet::Plane { form, .. }) = surface else {
+            return false;
+        };
+        let most = form.slope[along].abs();
+        (0..3).all(|c| c == along || form.slope[c].abs() <= 1e-13 * most)
+    }
+
+    /// A unit normal of the surface that makes an event, at its place on a line.
+    fn normal(&self, event: &Event, line: Line, place: f64) -> DVec3 {
+        let surface = self.surface_of(event);
+        surface.map_or(DVec3::ZERO, |(part, surface)| {
+            let slope = surface.slope(&part.affine, line, place) / self.cell;
+            slope.normalize_or_zero()
+        })
     }
 
     /// Sorts by place; what is at one place by label.

@@ -3,7 +3,7 @@
 use super::places::{Family, Places};
 use super::sheet::{Line, zero};
 use super::{BRANCHES, Crossed, MOST_ROWS, Row, SIDE, Sums};
-use crate::math::quadrature::{FIFTEEN, Integral, Nested, SEVEN, points};
+use crate::math::quadrature::{FIFTEEN, Integral, Nested, SEVEN, graded, points};
 use smallvec::SmallVec;
 
 /// How often a stretch is halved, or cut, one within another.
@@ -31,15 +31,7 @@ struct Stretch {
 impl Stretch {
     /// The place and its derivative at `u` of [0, 1].
     fn place(&self, u: f64) -> (f64, f64) {
-        let [a, b] = self.ends;
-        let (w, v) = (b - a, 1.0 - u);
-        match self.graded {
-            [false, false] => (a + w * u, w),
-            [true, false] => (a + w * u * u, 2.0 * w * u),
-            [false, true] => (b - w * v * v, 2.0 * w * v),
-            [true, true] if u < 0.5 => (a + w * u * u * (3.0 - 2.0 * u), 6.0 * w * u * v),
-            [true, true] => (b - w * v * v * (3.0 - 2.0 * v), 6.0 * w * u * v),
-        }
+        graded(self.ends, self.graded, u)
     }
 
     fn cut(&self, at: f64, graded: bool) -> [Self; 2] {

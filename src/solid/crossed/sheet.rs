@@ -555,7 +555,7 @@ fn branch(slope: f64) -> u32 {
 }
 
 /// The parameters in [0, 1) at which a line meets what a piece sweeps.
-fn parameters(piece: &Piece, o: DVec3, d: DVec3) -> SmallVec<[f64; 16]> {
+pub(in super::super) fn parameters(piece: &Piece, o: DVec3, d: DVec3) -> SmallVec<[f64; 16]> {
     let twin = piece.twin();
     let ([r, z, w], origin) = (twin.rows(), twin.origin);
     let plus = |a: &[f64], b: &[f64], times: f64| -> Coefficients<f64> {
