@@ -21,6 +21,29 @@ use voxlathe::{Scene, sample};
 
 const RING: &str = "schema = 1\n[grid]\nresolution = 6\n[profiles.p]\ncurves = [{ kind = 'circle', center = [2, 0], radius = 1 }]\n[[solid]]\nkind = 'revolve'\nprofile = 'p'\n";
 
+/// A run of `voxelize` on a grid, with channels and one more option.
+fn voxelizing<'a>(
+    scene: &'a str,
+    out: &'a str,
+    [grid, channels]: [&'a str; 2],
+    [option, value]: [&'a str; 2],
+) -> [&'a str; 12] {
+    [
+        "voxelize",
+        scene,
+        "-o",
+        out,
+        "--force",
+        "--json",
+        "--resolution",
+        grid,
+        "--channels",
+        channels,
+        option,
+        value,
+    ]
+}
+
 /// The bytes that a refusal asks for.
 fn needed(message: &str) -> Option<u64> {
     let rest = message.split("needs ").nth(1)?;
@@ -42,20 +65,7 @@ fn a_memory_limit_is_kept_or_the_run_refused() {
         let out = below(&t, "out");
         let mut stacks = Vec::new();
         let sampled = |limit: &str| {
-            let arguments = [
-                "voxelize",
-                &scene,
-                "-o",
-                &out,
-                "--force",
-                "--resolution",
-                grid,
-                "--channels",
-                channels,
-                "--memory-limit",
-                limit,
-                "--json",
-            ];
+            let arguments = voxelizing(&scene, &out, [grid, channels], ["--memory-limit", limit]);
             run(&arguments)
         };
         let refused = sampled("1MiB").exits(2);
@@ -80,6 +90,20 @@ fn a_memory_limit_is_kept_or_the_run_refused() {
     }
 }
 
+/// The space that a run asks for is within 5 % of what its files take.
+fn takes_what_it_asks_for(arguments: &[&str], out: &str) {
+    let ended = run(arguments).exits(0).json();
+    let asked = ended["bytes_expected"].as_u64().expect("a size");
+    let files = fs::read_dir(out)
+        .expect("a stack")
+        .map(|e| e.expect("an entry").metadata().expect("told").len());
+    let taken: u64 = files.sum();
+    assert!(
+        asked.abs_diff(taken) <= taken / 20,
+        "{arguments:?}: {taken} of {asked}"
+    );
+}
+
 #[test]
 fn the_space_asked_for_is_what_is_taken() {
     let t = scratch();
@@ -90,34 +114,38 @@ fn the_space_asked_for_is_what_is_taken() {
         ("torus", "20,90,30", "sdf"),
         ("goblet", "100", "occupancy,fraction,sdf"),
         ("cylinder", "80", "fraction"),
+        // Whose layers change at once.
+        ("flange", "40", "occupancy"),
+        ("flange", "12", "occupancy,fraction,sdf"),
+        ("steinmetz", "3", "occupancy"),
+        ("flange", "2,2,400", "occupancy"),
     ] {
         for compression in ["none", "rle", "zips", "zip", "piz", "pxr24"] {
-            let arguments = [
-                "voxelize",
-                &shipped(scene),
-                "-o",
-                &out,
-                "--force",
-                "--resolution",
-                grid,
-                "--channels",
-                channels,
-                "--compression",
-                compression,
-                "--json",
-            ];
-            let asked = run(&arguments).exits(0).json()["bytes_expected"]
-                .as_u64()
-                .expect("a size");
-            let files = fs::read_dir(&out)
-                .expect("a stack")
-                .map(|e| e.expect("an entry").metadata().expect("told").len());
-            let taken: u64 = files.sum();
-            assert!(
-                asked.abs_diff(taken) <= taken / 20 && (taken <= asked || compression != "none"),
-                "{scene} {grid} {channels} {compression}: {taken} of {asked}"
-            );
+            let compressed = ["--compression", compression];
+            let scene = shipped(scene);
+            let arguments = voxelizing(&scene, &out, [grid, channels], compressed);
+            takes_what_it_asks_for(&arguments, &out);
         }
+    }
+}
+
+#[test]
+fn previews_and_long_scenes_count_in_the_space_asked_for() {
+    let t = scratch();
+    let [scene, out] = ["ring.toml", "out"].map(|name| below(&t, name));
+    let text = RING.replace(
+        "kind = 'circle', center = [2, 0], radius = 1",
+        "kind = 'polyline', points = { file = 'wavy.csv' }",
+    );
+    fs::write(&scene, text).expect("written");
+    fs::write(t.path().join("wavy.csv"), wavy(5000)).expect("written");
+    for compression in ["none", "zip"] {
+        let compressed = ["--compression", compression];
+        let arguments = voxelizing(&scene, &out, ["16", "occupancy"], compressed);
+        takes_what_it_asks_for(&arguments, &out);
+        let torus = shipped("torus");
+        let arguments = voxelizing(&torus, &out, ["24", "occupancy"], compressed);
+        takes_what_it_asks_for(&[&arguments[..], &["--preview"]].concat(), &out);
     }
 }
 

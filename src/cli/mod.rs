@@ -16,6 +16,7 @@ mod mesh;
 mod output;
 mod query;
 mod render;
+mod space;
 mod step;
 mod validate;
 mod voxelize;

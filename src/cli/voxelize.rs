@@ -5,16 +5,18 @@ use super::failure::Failure;
 use super::interrupt;
 use super::memory::{self, Budget, Need};
 use super::output::{self, Console, NOTHING_LEFT, VOLUME_NOT_MEASURED};
+use super::space::{Forecast, refuse_beyond};
 use crate::error::Error;
 use crate::grid::{Channel, GridSpec};
-use crate::io::available_bytes;
+use crate::io::IoError;
 use crate::io::exr::{Compression, SampleKind, Samples};
 use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
-    ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_slice_bytes,
-    largest_stack_bytes,
+    ChannelSpec, SceneLabel, StackOptions, StackSpace, StackSummary, StackWriter,
+    largest_slice_bytes,
 };
 use crate::math::Kernel;
+use crate::math::quadrature::Integral;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{
     Certainty, FRACTION_ERROR, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
@@ -43,7 +45,8 @@ struct Plan {
     /// Bytes of a worker.
     layer_bytes: u64,
     workers: usize,
-    stack_bytes: u64,
+    /// What the stack takes without compression.
+    space: StackSpace,
     /// What it is expected to take, where that is known.
     expected_bytes: Option<u64>,
 }
@@ -101,21 +104,19 @@ pub(super) fn run(
     if arguments.dry_run {
         return dry_run(&scene, &plan, arguments, prepare, console);
     }
-    let options = StackOptions {
-        units: scene.model().units.name().to_owned(),
-        scene: Some(SceneLabel {
-            name: scene.name().to_owned(),
-            hash: scene.hash(),
-        }),
-        compression: plan.compression,
-        force: arguments.force,
-    };
     let writer = StackWriter::create(
         &arguments.output,
         &plan.grid,
         plan.channels.clone(),
-        options,
+        stack_options(&scene, arguments, plan.compression),
     )?;
+    let drawn = Instant::now();
+    if arguments.preview {
+        // First, so that what they take is known.
+        preview(&scene, &mut plan, &writer)?;
+        refuse_beyond(&arguments.output, least_bytes(&plan), 0)?;
+    }
+    let preview = drawn.elapsed().as_secs_f64();
     let Streamed {
         sample,
         write,
@@ -123,7 +124,7 @@ pub(super) fn run(
         fraction_sum,
         expected,
     } = stream(&sampler, &plan, &writer, arguments, console)?;
-    plan.expected_bytes = expected.or(plan.expected_bytes);
+    plan.expected_bytes = expected;
     let Ways {
         flux,
         sections,
@@ -142,17 +143,13 @@ pub(super) fn run(
     if let Some(warning) = said_of_fractions(&tally) {
         console.warn(&warning);
     }
-    let drawn = Instant::now();
-    if arguments.preview {
-        preview(&scene, &plan, &writer)?;
-    }
-    let preview = drawn.elapsed().as_secs_f64();
     let summary = StackSummary {
         fraction_sum: plan
             .selection
             .has(Channel::Fraction)
             .then_some(fraction_sum),
-        ..summary(&scene, &plan, &tally)
+        warnings: warnings(&scene, &plan.grid, Some(&tally)),
+        ..summary(&scene, &plan.selection, &plan.grid, Some(&tally))
     };
     let placed = Instant::now();
     let resolved = |to: &mut dyn std::io::Write| scene.model().write_resolved_indented(to);
@@ -314,7 +311,16 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         .saturating_mul(materials.len() as u64);
     let sampled = sampled.saturating_add(of_material);
     let layer_bytes = layer_bytes(&grid, sampled, &channels, scalars.len(), compression);
-    let stack_bytes = largest_stack_bytes(&grid, &channels);
+    let (stated, resolved) = (
+        summary(scene, &selection, &grid, None),
+        |to: &mut dyn std::io::Write| scene.model().write_resolved_indented(to),
+    );
+    let options = stack_options(scene, arguments, compression);
+    let space = StackSpace::new(&grid, &channels, &options, stated, &resolved);
+    let space = space.map_err(|error| IoError::Exr {
+        path: arguments.output.clone(),
+        error,
+    })?;
     let plan = Plan {
         grid,
         selection,
@@ -327,13 +333,37 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview),
         layer_bytes,
         workers: 1,
-        stack_bytes,
-        expected_bytes: (compression == Compression::None).then_some(stack_bytes),
+        space,
+        expected_bytes: (compression == Compression::None).then_some(space.uncompressed()),
     };
     // What is too large without its tables is not worth making them.
     plan.room()?;
-    check_disk(arguments, compression, stack_bytes)?;
+    refuse_beyond(&arguments.output, least_bytes(&plan), 0)?;
     Ok(plan)
+}
+
+fn stack_options(scene: &Scene, arguments: &Voxelize, compression: Compression) -> StackOptions {
+    StackOptions {
+        units: scene.model().units.name().to_owned(),
+        scene: Some(SceneLabel {
+            name: scene.name().to_owned(),
+            hash: scene.hash(),
+        }),
+        compression,
+        force: arguments.force,
+    }
+}
+
+/// Bytes that the stack takes at least: all, or where they are compressed what remains of the samples at best; what does
+/// is told by the layers that are made first.
+fn least_bytes(plan: &Plan) -> u64 {
+    /// The best ratio deflate reaches, on a constant layer.
+    const BEST: u64 = 1000;
+    if plan.compression == Compression::None {
+        plan.space.uncompressed()
+    } else {
+        (plan.space.slices / BEST).saturating_add(plan.space.beside)
+    }
 }
 
 impl Plan {
@@ -433,61 +463,6 @@ fn kind(model: &ChannelModel) -> SampleKind {
     channel(model).map_or(SampleKind::Float, |channel| channel.stored().into())
 }
 
-/// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand: what remains of the
-/// samples at best is assumed there, and [`check_rest`] looks again when some layers tell more.
-fn check_disk(
-    arguments: &Voxelize,
-    compression: Compression,
-    stack_bytes: u64,
-) -> Result<(), Failure> {
-    /// The best ratio deflate reaches, on a constant layer.
-    const BEST: u64 = 1000;
-    let needed = if compression == Compression::None {
-        stack_bytes
-    } else {
-        stack_bytes / BEST
-    };
-    let available = available_bytes(&arguments.output)?;
-    refuse_beyond(arguments, needed, available)?;
-    Ok(())
-}
-
-/// Refuses what will not fit by what the layers take that were written first; how much the whole is expected to take.
-fn check_rest(arguments: &Voxelize, writer: &StackWriter) -> Result<Option<u64>, Error> {
-    let Some(expected) = writer.expected_bytes() else {
-        return Ok(None);
-    };
-    let room = available_bytes(&arguments.output)?.saturating_add(expected.present);
-    refuse_beyond(arguments, expected.total(), room)?;
-    Ok(Some(expected.total()))
-}
-
-fn refuse_beyond(arguments: &Voxelize, needed: u64, available: u64) -> Result<(), Error> {
-    if needed <= available {
-        return Ok(());
-    }
-    Err(Error::TooLarge {
-        what: format!("the stack in {}", arguments.output.display()),
-        needed,
-        available,
-        remedy: "lower the resolution, choose fewer channels or another disk".into(),
-    })
-}
-
-/// The layers in the order in which they are made, and how many come first: some of all heights, where what a layer takes
-/// on the disk is told by no more than its making.
-fn order(layers: usize, compression: Compression) -> (Vec<usize>, usize) {
-    /// Of a solid that starts at once, half of a step is missed or taken in excess: an 128th of its height.
-    const FIRST: usize = 64;
-    let count = (layers / 4).clamp(1, FIRST);
-    if compression == Compression::None || layers < 8 {
-        return ((0..layers).collect(), 0);
-    }
-    let first: Vec<usize> = (0..=count).map(|i| i * (layers - 1) / count).collect();
-    let others = (0..layers).filter(|k| first.binary_search(k).is_err());
-    (first.iter().copied().chain(others).collect(), first.len())
-}
-
 /// Distances are stored as f32: the grid must not leave its range.
 fn check_f32_range(scene: &Scene, grid: &GridSpec) -> Result<(), Error> {
     let [nx, ny, nz] = grid.dims();
@@ -528,16 +503,15 @@ fn stream(
 ) -> Result<Streamed, Failure> {
     let workers = plan.workers;
     let layers = plan.grid.dims()[2];
-    let (order, first) = order(layers, plan.compression);
-    let missing = AtomicUsize::new(first);
-    let expected = Mutex::new(None);
+    let (compression, beside) = (plan.compression, plan.space.beside);
+    let forecast = Forecast::new(layers, compression, beside, plan.expected_bytes);
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
     let failed = AtomicBool::new(false);
     let failure: Mutex<Option<Error>> = Mutex::new(None);
     let nanoseconds = [AtomicU64::new(0), AtomicU64::new(0)];
     let tally = Mutex::new((Tally::default(), vec![0.0; layers]));
-    let work = |buffers: &mut LayerBuffers, k: usize| -> Result<(), Error> {
+    let work = |buffers: &mut LayerBuffers, (n, k): (usize, usize)| -> Result<(), Error> {
         interrupt::check()?;
         let begin = Instant::now();
         sampler.sample(k, buffers);
@@ -549,11 +523,7 @@ fn stream(
         all.0.add(&buffers.tally);
         all.1[k] = buffers.fraction_sum;
         drop(all);
-        // The one that has made the last of the first layers looks.
-        if order[..first].contains(&k) && missing.fetch_sub(1, Ordering::AcqRel) == 1 {
-            let found = check_rest(arguments, writer)?;
-            *expected.lock().unwrap_or_else(PoisonError::into_inner) = found;
-        }
+        forecast.made(n, &arguments.output, writer)?;
         for (total, time) in nanoseconds.iter().zip([sampled - begin, sampled.elapsed()]) {
             total.fetch_add(
                 u64::try_from(time.as_nanos()).unwrap_or(u64::MAX),
@@ -568,10 +538,11 @@ fn stream(
             scope.spawn(|_| {
                 let mut buffers = LayerBuffers::default();
                 while !failed.load(Ordering::Relaxed) {
-                    let Some(&k) = order.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                    let n = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(k) = forecast.layer(n) else {
                         break;
                     };
-                    if let Err(error) = work(&mut buffers, k) {
+                    if let Err(error) = work(&mut buffers, (n, k)) {
                         failed.store(true, Ordering::Relaxed);
                         let mut first = failure.lock().unwrap_or_else(PoisonError::into_inner);
                         first.get_or_insert(error);
@@ -595,9 +566,7 @@ fn stream(
         write,
         tally,
         fraction_sum,
-        expected: expected
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner),
+        expected: forecast.expected(writer),
     })
 }
 
@@ -609,12 +578,12 @@ struct Streamed {
     write: f64,
     tally: Tally,
     fraction_sum: f64,
-    /// Bytes that the stack was expected to take when some layers were made.
+    /// Bytes that the stack was expected to take when some layers were made; see [`Forecast`].
     expected: Option<u64>,
 }
 
 /// Draws the preview's two pictures beside the slices; the manifest lists them.
-fn preview(scene: &Scene, plan: &Plan, writer: &StackWriter) -> Result<(), Failure> {
+fn preview(scene: &Scene, plan: &mut Plan, writer: &StackWriter) -> Result<(), Failure> {
     let interrupted = || interrupt::check().is_err();
     let options = RenderOptions {
         width: 960,
@@ -630,8 +599,10 @@ fn preview(scene: &Scene, plan: &Plan, writer: &StackWriter) -> Result<(), Failu
     ];
     for (name, picture) in pictures {
         let bytes = picture.to_png().map_err(Error::from)?;
+        plan.space = plan.space.with_file(bytes.len() as u64);
         writer.write_other(name, &bytes)?;
     }
+    plan.expected_bytes = (plan.expected_bytes).map(|_| plan.space.uncompressed());
     Ok(())
 }
 
@@ -705,10 +676,10 @@ fn rounded_up(bound: f64) -> f64 {
     (bound / unit * (1.0 - 1e-9)).ceil() * unit
 }
 
-fn warnings(scene: &Scene, plan: &Plan, tally: Option<&Tally>) -> Vec<String> {
+fn warnings(scene: &Scene, grid: &GridSpec, tally: Option<&Tally>) -> Vec<String> {
     let volume = said_of_volume(scene).map(str::to_owned);
     let said = scene.warnings().iter().cloned();
-    said.chain(scene.grid_warning(&plan.grid))
+    said.chain(scene.grid_warning(grid))
         .chain(volume)
         .chain(tally.and_then(said_of_fractions))
         .collect()
@@ -735,9 +706,14 @@ fn certainty(count: &Certainty) -> Value {
     })
 }
 
-/// What each material takes of the solid.
-fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<MaterialVolume> {
-    let voxel = plan.grid.spacing().element_product();
+/// What each material takes of the solid; without a tally some numbers in its place.
+fn material_volumes(
+    scene: &Scene,
+    selection: &Selection,
+    grid: &GridSpec,
+    tally: Option<&Tally>,
+) -> Vec<MaterialVolume> {
+    let voxel = grid.spacing().element_product();
     let mut ids: Vec<u32> = scene
         .assembly()
         .parts()
@@ -748,11 +724,15 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<MaterialVo
     ids.dedup();
     let only = ids.len() == 1;
     let one = |id: u32| {
-        let voxels = tally.materials.get(&id).copied().unwrap_or(0);
-        let sampled = plan.selection.has(Channel::Material).then_some(voxels);
+        let voxels = tally.map_or(grid.voxel_count() / 2, |t| {
+            t.materials.get(&id).copied().unwrap_or(0)
+        });
+        let sampled = selection.has(Channel::Material).then_some(voxels);
         #[allow(clippy::cast_precision_loss, reason = "counts of voxels")]
         let volume = sampled.map(|n| n as f64 * voxel);
-        let exact = if only {
+        let exact = if tally.is_none() {
+            Some(SOME)
+        } else if only {
             scene.volume_beside_sampling()
         } else {
             let part = scene.assembly().of_material(id);
@@ -770,8 +750,25 @@ fn material_volumes(scene: &Scene, plan: &Plan, tally: &Tally) -> Vec<MaterialVo
     ids.into_iter().map(one).collect()
 }
 
-fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
+/// A number in the place of one that is not known yet.
+const SOME: Integral = Integral {
+    value: 12.345_678_901_234_567,
+    error: 1.234_567_890_123_456_7e-12,
+};
+
+/// What the manifest says; without a tally, some numbers in the place of those that take work.
+fn summary(
+    scene: &Scene,
+    selection: &Selection,
+    grid: &GridSpec,
+    tally: Option<&Tally>,
+) -> StackSummary {
     let b = scene.bounds();
+    let total = if tally.is_some() {
+        scene.volume_beside_sampling()
+    } else {
+        Some(SOME)
+    };
     let solids: Vec<Value> = scene
         .assembly()
         .parts()
@@ -782,20 +779,22 @@ fn summary(scene: &Scene, plan: &Plan, tally: &Tally) -> StackSummary {
                 "operation": operation_name(p.operation()),
                 "material": p.material(),
                 "bounds": [p.bounds().min.to_array(), p.bounds().max.to_array()],
-                "volume": p.volume().value,
+                "volume": tally.map_or(SOME, |_| p.volume()).value,
             })
         })
         .collect();
     StackSummary {
         bounds: Some([b.min.to_array(), b.max.to_array()]),
-        volume_exact: scene.volume_beside_sampling().map(|v| v.value),
-        volume_exact_error: scene.volume_beside_sampling().map(|v| v.error),
+        volume_exact: total.map(|v| v.value),
+        volume_exact_error: total.map(|v| v.error),
         solids: Value::Array(solids),
         materials: json!(scene.model().materials),
-        warnings: warnings(scene, plan, Some(tally)),
-        material_volumes: material_volumes(scene, plan, tally),
-        certainty: if plan.selection.has(Channel::Sdf) {
-            certainty(&tally.certainty)
+        warnings: (scene.warnings().iter().cloned())
+            .chain(scene.grid_warning(grid))
+            .collect(),
+        material_volumes: material_volumes(scene, selection, grid, tally),
+        certainty: if selection.has(Channel::Sdf) {
+            certainty(&tally.map_or_else(Certainty::default, |t| t.certainty))
         } else {
             Value::Null
         },
@@ -823,7 +822,7 @@ fn document(
         "compression": plan.compression.name(),
         "files": manifest.map(|m| m.files.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()),
         "bytes": manifest.map(|m| m.files.iter().map(|f| f.bytes).sum::<u64>()),
-        "bytes_uncompressed": plan.stack_bytes,
+        "bytes_uncompressed": plan.space.uncompressed(),
         "bytes_expected": plan.expected_bytes,
         "memory_bytes": plan.memory_bytes(),
         "voxels_inside": manifest.and_then(|m| m.voxels_inside),
@@ -833,7 +832,7 @@ fn document(
         "volume_exact_error": scene.volume_beside_sampling().map(|v| v.error),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": memory::peak(),
-        "warnings": warnings(scene, plan, tally),
+        "warnings": warnings(scene, &plan.grid, tally),
     })
 }
 
@@ -854,10 +853,15 @@ fn dry_run(
     let [nx, ny, nz] = plan.grid.dims();
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
     let text = format!(
-        "would write {nz} slices of {nx} x {ny} voxels ({}) to {}\nat most {} on disk, {} of memory for {} layers at a time\n",
+        "would write {nz} slices of {nx} x {ny} voxels ({}) to {}\nat most {} on disk{}, {} of memory for {} layers at a time\n",
         names.join(", "),
         arguments.output.display(),
-        output::bytes(plan.stack_bytes),
+        output::bytes(plan.space.uncompressed()),
+        if arguments.preview {
+            " and the previews"
+        } else {
+            ""
+        },
         output::bytes(plan.memory_bytes()),
         plan.workers,
     );

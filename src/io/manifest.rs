@@ -205,19 +205,17 @@ impl Manifest {
         scene: &'a WriteScene<'a>,
     ) -> Result<impl FnOnce(&mut File) -> io::Result<()> + 'a, String> {
         let head = self.head()?;
-        Ok(move |file: &mut File| {
-            let mut whole = Digested {
-                to: BufWriter::new(file),
-                digest: blake3::Hasher::new(),
-            };
-            whole.write_all(&head)?;
-            scene(&mut Indented(&mut whole))?;
-            whole.write_all(DIGEST_KEY)?;
-            let Digested { mut to, digest } = whole;
-            to.write_all(digest.finalize().to_hex().as_bytes())?;
-            to.write_all(END)?;
-            to.flush()
-        })
+        Ok(move |file: &mut File| write_whole(&head, scene, &mut BufWriter::new(file)))
+    }
+
+    /// How many bytes [`written_with`](Self::written_with) writes.
+    ///
+    /// # Errors
+    /// As [`to_bytes`](Self::to_bytes).
+    pub(super) fn length_with(&self, scene: &WriteScene<'_>) -> Result<u64, String> {
+        let mut length = Length(0);
+        write_whole(&self.head()?, scene, &mut length).map_err(|e| e.to_string())?;
+        Ok(length.0)
     }
 
     /// The manifest in `bytes`.
@@ -379,6 +377,35 @@ pub(super) fn with_digest(mut object: Vec<u8>) -> Vec<u8> {
 
 /// Writes a scene as indented JSON.
 pub type WriteScene<'a> = dyn Fn(&mut dyn Write) -> io::Result<()> + 'a;
+
+/// Writes a manifest from what it begins with and its scene.
+fn write_whole(head: &[u8], scene: &WriteScene<'_>, to: &mut dyn Write) -> io::Result<()> {
+    let mut whole = Digested {
+        to,
+        digest: blake3::Hasher::new(),
+    };
+    whole.write_all(head)?;
+    scene(&mut Indented(&mut whole))?;
+    whole.write_all(DIGEST_KEY)?;
+    let Digested { to, digest } = whole;
+    to.write_all(digest.finalize().to_hex().as_bytes())?;
+    to.write_all(END)?;
+    to.flush()
+}
+
+/// Counts bytes.
+struct Length(u64);
+
+impl Write for Length {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0 += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
 
 /// What goes on to a writer, with its digest.
 struct Digested<W> {

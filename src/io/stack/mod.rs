@@ -16,9 +16,11 @@
 //! Sums and ranges are kept layer by layer and joined in the order of the layers, so they do not
 //! depend on which thread wrote what when.
 
+mod space;
 mod statistics;
 mod volumes;
 
+pub use self::space::{Expected, StackSpace, largest_slice_bytes, largest_stack_bytes};
 pub(super) use self::statistics::Statistics;
 pub use self::volumes::{StackChannel, write_stack};
 
@@ -142,23 +144,6 @@ pub struct StackSummary {
     pub certainty: serde_json::Value,
     /// The resolved scene.
     pub scene: serde_json::Value,
-}
-
-/// What a stack takes on its disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Expected {
-    /// Bytes of the layers that are written.
-    pub present: u64,
-    /// Bytes that the others and the manifest are expected to take.
-    pub rest: u64,
-}
-
-impl Expected {
-    /// Bytes of the whole.
-    #[must_use]
-    pub fn total(&self) -> u64 {
-        self.present.saturating_add(self.rest)
-    }
 }
 
 /// A stack while it is being written.
@@ -313,8 +298,10 @@ impl StackWriter {
 
     /// Bytes that the whole stack will take, judging by the layers that are written: one that is not is taken to be as
     /// large as the two written ones about it are on average. With what these take already; `None` where there is none.
+    ///
+    /// * `beside`: bytes of the manifest and the files beside the slices; see [`StackSpace`].
     #[must_use]
-    pub fn expected_bytes(&self) -> Option<Expected> {
+    pub fn expected_bytes(&self, beside: u64) -> Option<Expected> {
         let written = self.written();
         let mut sizes = written.layers.iter().map(|(&k, (file, _))| (k, file.bytes));
         let mut before = sizes.next()?;
@@ -327,9 +314,7 @@ impl StackWriter {
         }
         let layers = self.grid.dims()[2];
         let after = (layers - 1 - before.0) as u64 * before.1;
-        let rest = (between.saturating_add(after))
-            .saturating_add(RECORD.saturating_mul(layers as u64))
-            .saturating_add(MANIFEST);
+        let rest = between.saturating_add(after).saturating_add(beside);
         Some(Expected { present, rest })
     }
 
@@ -387,78 +372,17 @@ impl StackWriter {
         let totals: Vec<Statistics> = (0..self.channels.len())
             .map(|c| Statistics::join(written.layers.values().map(|(_, s)| s[c])))
             .collect();
-        let total = |name: &str| {
-            let c = self.channels.iter().position(|c| c.name == name)?;
-            Some(totals[c])
-        };
-        let mut warnings = summary.warnings;
-        for (channel, total) in self.channels.iter().zip(&totals) {
-            if total.infinite > 0 {
-                warnings.push(format!(
-                    "{} samples of {} are infinite; its range is that of the others",
-                    total.infinite, channel.name
-                ));
-            }
-        }
-        let voxel = self.grid.voxel_volume();
-        let finite = |v: &f64| v.is_finite();
-        let voxels_inside = total("occupancy")
-            .map(|t| t.count)
-            .or(summary.voxels_inside);
-        #[allow(
-            clippy::cast_precision_loss,
-            reason = "a count of 2^53 voxels is out of reach"
-        )]
-        let volume_occupancy = voxels_inside.map(|n| n as f64 * voxel).filter(finite);
-        let stored = total("fraction").map(|t| t.sum);
-        let fractions = stored.map(|sum| summary.fraction_sum.unwrap_or(sum));
-        let volume_fraction = fractions.map(|sum| sum * voxel).filter(finite);
-        let volume_fraction_stored = stored.map(|sum| sum * voxel).filter(finite);
         let mut files: Vec<FileRecord> = written.layers.into_values().map(|l| l.0).collect();
         let mut others = written.others;
         others.sort_by(|a, b| a.name.cmp(&b.name));
         files.extend(others);
-        let (scene_name, scene_hash) = self
-            .options
-            .scene
-            .map_or((None, None), |s| (Some(s.name), Some(s.hash)));
-        let manifest = Manifest {
-            format: FORMAT.into(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            schema: SCHEMA,
-            scene_name,
-            scene_hash,
-            units: self.options.units,
-            sign_convention: SIGN_CONVENTION.into(),
-            grid: ManifestGrid::from(&self.grid),
-            bounds: summary.bounds,
-            channels: self
-                .channels
-                .into_iter()
-                .zip(&totals)
-                .map(|(c, t)| ChannelRecord {
-                    name: c.name,
-                    kind: c.kind,
-                    meaning: c.meaning,
-                    unit: c.unit,
-                    range: t.range(),
-                })
-                .collect(),
-            compression: self.compression.name().into(),
-            files,
-            voxels_inside,
-            volume_occupancy,
-            volume_fraction,
-            volume_fraction_stored,
-            volume_exact: summary.volume_exact,
-            volume_exact_error: summary.volume_exact_error,
-            solids: summary.solids,
-            materials: summary.materials,
-            warnings,
-            material_volumes: summary.material_volumes,
-            certainty: summary.certainty,
-            scene: summary.scene,
+        let description = Description {
+            grid: &self.grid,
+            channels: &self.channels,
+            options: &self.options,
+            compression: self.compression,
         };
+        let manifest = description.manifest(files, &totals, summary);
         let mismatch = |reason| IoError::Mismatch {
             path: path.join(MANIFEST_NAME),
             reason,
@@ -487,38 +411,92 @@ impl StackWriter {
     }
 }
 
-/// Bytes of a slice's header but for its channels, with a name of the scene as long as it may be.
-const HEADER: u64 = 1088;
-/// Bytes of a channel's entry there, but for its name.
-const CHANNEL: u64 = 18;
-/// Bytes of a slice's record in the manifest.
-const RECORD: u64 = 224;
-/// Bytes of the rest of the manifest, but for a long scene.
-const MANIFEST: u64 = 4096;
-
-/// Bytes that a stack of these channels takes at most, to compare with
-/// [`available_bytes`](super::directory::available_bytes) before any work.
-#[must_use]
-pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
-    largest_slice_bytes(grid, channels)
-        .saturating_add(RECORD)
-        .saturating_mul(grid.dims()[2] as u64)
-        .saturating_add(MANIFEST)
+/// What a manifest says of a stack but for its files and what is in them.
+struct Description<'a> {
+    grid: &'a GridSpec,
+    channels: &'a [ChannelSpec],
+    options: &'a StackOptions,
+    compression: Compression,
 }
 
-/// Bytes that one slice takes at most.
-///
-/// No slice is larger than its samples with the offsets and sizes of its lines and its header.
-#[must_use]
-pub fn largest_slice_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
-    let [nx, ny, _] = grid.dims().map(|d| d as u64);
-    let pixel: u64 = channels.iter().map(|c| c.kind.bytes() as u64).sum();
-    // Each line has an offset of 8 bytes, its row and its size of 4 bytes each.
-    nx.saturating_mul(pixel)
-        .saturating_add(16)
-        .saturating_mul(ny)
-        .saturating_add(HEADER)
-        .saturating_add(channels.iter().map(|c| CHANNEL + c.name.len() as u64).sum())
+impl Description<'_> {
+    /// The manifest of these files, whose channels hold what `totals` says.
+    fn manifest(
+        &self,
+        files: Vec<FileRecord>,
+        totals: &[Statistics],
+        summary: StackSummary,
+    ) -> Manifest {
+        let total = |name: &str| {
+            let c = self.channels.iter().position(|c| c.name == name)?;
+            Some(totals[c])
+        };
+        let mut warnings = summary.warnings;
+        for (channel, total) in self.channels.iter().zip(totals) {
+            if total.infinite > 0 {
+                warnings.push(format!(
+                    "{} samples of {} are infinite; its range is that of the others",
+                    total.infinite, channel.name
+                ));
+            }
+        }
+        let voxel = self.grid.voxel_volume();
+        let finite = |v: &f64| v.is_finite();
+        let voxels_inside = total("occupancy")
+            .map(|t| t.count)
+            .or(summary.voxels_inside);
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "a count of 2^53 voxels is out of reach"
+        )]
+        let volume_occupancy = voxels_inside.map(|n| n as f64 * voxel).filter(finite);
+        let stored = total("fraction").map(|t| t.sum);
+        let fractions = stored.map(|sum| summary.fraction_sum.unwrap_or(sum));
+        let volume_fraction = fractions.map(|sum| sum * voxel).filter(finite);
+        let volume_fraction_stored = stored.map(|sum| sum * voxel).filter(finite);
+        let (scene_name, scene_hash) = self
+            .options
+            .scene
+            .clone()
+            .map_or((None, None), |s| (Some(s.name), Some(s.hash)));
+        Manifest {
+            format: FORMAT.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            schema: SCHEMA,
+            scene_name,
+            scene_hash,
+            units: self.options.units.clone(),
+            sign_convention: SIGN_CONVENTION.into(),
+            grid: ManifestGrid::from(self.grid),
+            bounds: summary.bounds,
+            channels: self
+                .channels
+                .iter()
+                .zip(totals)
+                .map(|(c, t)| ChannelRecord {
+                    name: c.name.clone(),
+                    kind: c.kind,
+                    meaning: c.meaning.clone(),
+                    unit: c.unit.clone(),
+                    range: t.range(),
+                })
+                .collect(),
+            compression: self.compression.name().into(),
+            files,
+            voxels_inside,
+            volume_occupancy,
+            volume_fraction,
+            volume_fraction_stored,
+            volume_exact: summary.volume_exact,
+            volume_exact_error: summary.volume_exact_error,
+            solids: summary.solids,
+            materials: summary.materials,
+            warnings,
+            material_volumes: summary.material_volumes,
+            certainty: summary.certainty,
+            scene: summary.scene,
+        }
+    }
 }
 
 fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {

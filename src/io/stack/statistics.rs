@@ -5,7 +5,8 @@
 
 use std::ops::Range;
 
-use super::super::exr::Samples;
+use super::super::exr::{SampleKind, Samples};
+use super::ChannelSpec;
 use crate::grid::{Channel, Stored};
 
 /// Independent accumulators: four of SSE's registers, or one of AVX-512's.
@@ -35,6 +36,23 @@ impl Statistics {
         sum: 0.0,
         infinite: 0,
     };
+
+    /// Numbers of as many digits as those of a channel of so many voxels are likely to have.
+    pub(super) fn likely(channel: &ChannelSpec, voxels: u64) -> Self {
+        let whole = channel.kind != SampleKind::Float || channel.name == "fraction";
+        let [min, max] = if whole {
+            [0.0, 1.0]
+        } else {
+            [-1.234_567_880_630_493_2, 1.234_567_880_630_493_2]
+        };
+        Self {
+            min,
+            max,
+            count: voxels / 2,
+            sum: 0.123_456_789_012_345_67,
+            infinite: 0,
+        }
+    }
 
     /// Of the samples in rows of `width`; what is wrong when they cannot be that channel's.
     pub(in super::super) fn of(

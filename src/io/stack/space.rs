@@ -1,0 +1,165 @@
+//! What a stack takes on its disk: before there is anything of it, and by what is written.
+//!
+//! ```text
+//!   slices      header + for each line its offset, row, size and samples     exactly, without compression
+//!   manifest    that of likely numbers, with the scene as it will be         but for some digits
+//!   others      as large as they are
+//! ```
+//!
+//! With compression the slices that are written tell of the others; see [`StackWriter::expected_bytes`].
+//!
+//! [`StackWriter::expected_bytes`]: super::StackWriter::expected_bytes
+
+use super::super::exr::{
+    Attributes, Compression, ExrError, SampleKind, Samples, encode_layer, layer_attributes,
+};
+use super::super::manifest::{FileRecord, WriteScene, slice_name};
+use super::{ChannelSpec, Description, StackOptions, StackSummary, Statistics};
+use crate::grid::GridSpec;
+
+/// What a stack takes on its disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expected {
+    /// Bytes of the layers that are written.
+    pub present: u64,
+    /// Bytes that the others, the manifest and what is beside them are expected to take.
+    pub rest: u64,
+}
+
+impl Expected {
+    /// Bytes of the whole.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.present.saturating_add(self.rest)
+    }
+}
+
+/// What the files of a stack take before its samples are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StackSpace {
+    /// Bytes of all slices without compression.
+    pub slices: u64,
+    /// Bytes of the manifest and of the files beside the slices.
+    pub beside: u64,
+}
+
+impl StackSpace {
+    /// What a stack takes whose manifest says `summary` and, as `scene` writes it, the resolved scene. Numbers that are
+    /// not known yet have as many digits as they are likely to have.
+    ///
+    /// # Errors
+    /// [`ExrError`] when the layers do not fit the format, or the manifest cannot be written.
+    pub fn new(
+        grid: &GridSpec,
+        channels: &[ChannelSpec],
+        options: &StackOptions,
+        summary: StackSummary,
+        scene: &WriteScene<'_>,
+    ) -> Result<Self, ExrError> {
+        let slice = slice_bytes(grid, channels, options)?;
+        let layers = grid.dims()[2];
+        let file = |k: usize| FileRecord {
+            name: slice_name(k, layers),
+            slice: Some(k),
+            z: Some(grid.centre_along(2, k)),
+            bytes: slice,
+            blake3: "0".repeat(64),
+        };
+        let totals: Vec<Statistics> = (channels.iter())
+            .map(|c| Statistics::likely(c, grid.voxel_count()))
+            .collect();
+        let description = Description {
+            grid,
+            channels,
+            options,
+            compression: Compression::None,
+        };
+        let files = (0..layers).map(file).collect();
+        let manifest = description.manifest(files, &totals, summary);
+        let manifest = manifest.length_with(scene);
+        Ok(Self {
+            slices: slice.saturating_mul(layers as u64),
+            beside: manifest.map_err(|reason| ExrError::Encode { reason })?,
+        })
+    }
+
+    /// The same with one more file, of so many bytes, beside the slices.
+    #[must_use]
+    pub fn with_file(self, bytes: u64) -> Self {
+        // Its own record.
+        Self {
+            beside: self.beside.saturating_add(bytes).saturating_add(RECORD),
+            ..self
+        }
+    }
+
+    /// Bytes of the whole without compression.
+    #[must_use]
+    pub fn uncompressed(&self) -> u64 {
+        self.slices.saturating_add(self.beside)
+    }
+}
+
+/// Bytes of a slice without compression.
+fn slice_bytes(
+    grid: &GridSpec,
+    channels: &[ChannelSpec],
+    options: &StackOptions,
+) -> Result<u64, ExrError> {
+    let scene = options.scene.as_ref();
+    let scene = scene.map(|s| (s.name.as_str(), s.hash.as_str()));
+    let attributes: Attributes = layer_attributes(grid, 0, &options.units, scene);
+    // A header is as long for one voxel as for many.
+    let one = |kind| match kind {
+        SampleKind::Half => Samples::Half(&[0]),
+        SampleKind::Float => Samples::Float(&[0.0]),
+        SampleKind::Uint => Samples::Uint(&[0]),
+    };
+    let samples: Vec<_> = (channels.iter())
+        .map(|c| (c.name.as_str(), one(c.kind)))
+        .collect();
+    let least = encode_layer([1, 1], &samples, &attributes, Compression::None)?.len() as u64;
+    let [nx, ny, _] = grid.dims().map(|d| d as u64);
+    let pixel = pixel_bytes(channels);
+    Ok(least - (LINE + pixel) + line_bytes(nx, pixel).saturating_mul(ny))
+}
+
+/// Bytes of a slice's header but for its channels, with a name of the scene as long as it may be.
+const HEADER: u64 = 1088;
+/// Bytes of a channel's entry there, but for its name.
+const CHANNEL: u64 = 18;
+/// Bytes of a file's record in the manifest.
+const RECORD: u64 = 224;
+/// Bytes of the rest of the manifest, but for a long scene.
+const MANIFEST: u64 = 4096;
+/// Bytes of a line's offset, row and size.
+const LINE: u64 = 16;
+
+fn pixel_bytes(channels: &[ChannelSpec]) -> u64 {
+    channels.iter().map(|c| c.kind.bytes() as u64).sum()
+}
+
+fn line_bytes(nx: u64, pixel: u64) -> u64 {
+    nx.saturating_mul(pixel).saturating_add(LINE)
+}
+
+/// Bytes that a stack of these channels takes at most, where its scene is short.
+#[must_use]
+pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    largest_slice_bytes(grid, channels)
+        .saturating_add(RECORD)
+        .saturating_mul(grid.dims()[2] as u64)
+        .saturating_add(MANIFEST)
+}
+
+/// Bytes that one slice takes at most.
+///
+/// No slice is larger than its samples with the offsets and sizes of its lines and its header.
+#[must_use]
+pub fn largest_slice_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
+    let [nx, ny, _] = grid.dims().map(|d| d as u64);
+    line_bytes(nx, pixel_bytes(channels))
+        .saturating_mul(ny)
+        .saturating_add(HEADER)
+        .saturating_add(channels.iter().map(|c| CHANNEL + c.name.len() as u64).sum())
+}
