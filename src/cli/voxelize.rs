@@ -2,18 +2,16 @@
 
 use super::arguments::{Common, Voxelize};
 use super::failure::Failure;
+use super::formats::Formats;
 use super::interrupt;
 use super::memory::{self, Budget, Need};
 use super::output::{self, Console, NOTHING_LEFT, VOLUME_NOT_MEASURED};
 use crate::error::Error;
 use crate::grid::{Channel, GridSpec};
-use crate::io::available_bytes;
 use crate::io::exr::{Compression, SampleKind, Samples};
 use crate::io::manifest::{Manifest, MaterialVolume};
-use crate::io::stack::{
-    ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter, largest_slice_bytes,
-    largest_stack_bytes,
-};
+use crate::io::stack::{ChannelSpec, SceneLabel, StackOptions, StackSummary, StackWriter};
+use crate::io::{IoError, available_bytes};
 use crate::math::Kernel;
 use crate::picture::{RenderOptions, contact_sheet, render};
 use crate::sample::{
@@ -34,7 +32,7 @@ struct Plan {
     kernel: Kernel,
     scalars: Vec<Scalar>,
     channels: Vec<ChannelSpec>,
-    compression: Compression,
+    formats: Formats,
     budget: Budget,
     /// Bytes that the records of all layers, and the previews, take.
     fixed_bytes: u64,
@@ -86,6 +84,9 @@ pub(super) fn run(
     if let Some(warning) = scene.grid_warning(&plan.grid) {
         console.warn(&warning);
     }
+    if let Some(warning) = plan.formats.warning(&plan.grid, &plan.channels) {
+        console.warn(&warning);
+    }
     let prepare = start.elapsed().as_secs_f64();
     tracing::debug!(dims = ?plan.grid.dims(), workers = plan.workers, layer_bytes = plan.layer_bytes, "planned");
     if arguments.dry_run {
@@ -97,15 +98,10 @@ pub(super) fn run(
             name: scene.name().to_owned(),
             hash: scene.hash(),
         }),
-        compression: plan.compression,
+        formats: plan.formats.kinds.clone(),
         force: arguments.force,
     };
-    let writer = StackWriter::create(
-        &arguments.output,
-        &plan.grid,
-        plan.channels.clone(),
-        options,
-    )?;
+    let writer = writer(&plan, arguments, options)?;
     let Streamed {
         sample,
         write,
@@ -163,6 +159,20 @@ pub(super) fn run(
         &report(&scene, arguments, &manifest, &seconds),
     )?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The writer of a directory, or of one file.
+fn writer(
+    plan: &Plan,
+    arguments: &Voxelize,
+    options: StackOptions,
+) -> Result<StackWriter, IoError> {
+    let (path, channels) = (&arguments.output, plan.channels.clone());
+    if plan.formats.is_single {
+        let kind = plan.formats.kinds[0];
+        return StackWriter::create_single(path, &plan.grid, channels, kind, options);
+    }
+    StackWriter::create(path, &plan.grid, channels, options)
 }
 
 /// Puts the command's flags in place of the scene's own choices.
@@ -276,39 +286,31 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
     if selection.has(Channel::Sdf) {
         check_f32_range(scene, &grid)?;
     }
-    let compression = match output.compression {
-        CompressionName::Auto => Compression::Auto,
-        CompressionName::None => Compression::None,
-        CompressionName::Rle => Compression::Rle,
-        CompressionName::Zips => Compression::Zips,
-        CompressionName::Zip => Compression::Zip,
-        CompressionName::Piz => Compression::Piz,
-        CompressionName::Pxr24 => Compression::Pxr24,
-    };
-    let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
+    let formats = Formats::of(scene, arguments, &grid, &channels)?;
     let sampled =
         LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection).saturating_add(
             LayerSampler::bytes_of_division(scene.assembly(), &selection),
         );
-    let layer_bytes = layer_bytes(&grid, sampled, &channels, scalars.len(), compression);
-    let stack_bytes = largest_stack_bytes(&grid, &channels);
+    let layer_bytes = layer_bytes(&grid, sampled, scalars.len(), &formats);
+    let stack_bytes = formats.needs.disk;
     let plan = Plan {
         grid,
         selection,
         kernel,
         scalars,
         channels,
-        compression,
         budget: Budget::new(arguments.memory_limit),
-        fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview),
+        fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview)
+            .saturating_add(formats.needs.memory),
         layer_bytes,
         workers: 1,
         stack_bytes,
-        expected_bytes: (compression == Compression::None).then_some(stack_bytes),
+        expected_bytes: formats.needs.disk_is_sure.then_some(stack_bytes),
+        formats,
     };
     // What is too large without its tables is not worth making them.
     plan.room()?;
-    check_disk(arguments, compression, stack_bytes)?;
+    check_disk(arguments, plan.formats.least)?;
     Ok(plan)
 }
 
@@ -344,25 +346,12 @@ fn fixed_bytes(grid: &GridSpec, channels: usize, preview: bool) -> u64 {
     records.saturating_add(if preview { PREVIEW } else { 0 })
 }
 
-/// Memory that a worker takes: the samples of one layer, `sampled` bytes but for scalars, their EXR form and what makes
-/// it.
-fn layer_bytes(
-    grid: &GridSpec,
-    sampled: u64,
-    channels: &[ChannelSpec],
-    scalars: usize,
-    compression: Compression,
-) -> u64 {
+/// Memory that a worker takes: the samples of one layer, `sampled` bytes but for scalars, and what makes files of it.
+fn layer_bytes(grid: &GridSpec, sampled: u64, scalars: usize, formats: &Formats) -> u64 {
     let scalars = 4 * (grid.layer_len() as u64).saturating_mul(scalars as u64);
-    // A compressed file grows as it comes, to at most twice its size, and is copied as it grows.
-    let copies = if compression == Compression::None {
-        1
-    } else {
-        3
-    };
     sampled
         .saturating_add(scalars)
-        .saturating_add(largest_slice_bytes(grid, channels).saturating_mul(copies))
+        .saturating_add(formats.needs.each)
 }
 
 fn channel(model: &ChannelModel) -> Option<Channel> {
@@ -405,20 +394,9 @@ fn kind(model: &ChannelModel) -> SampleKind {
 
 /// Refuses what cannot fit before anything is written. Compressed sizes are not known beforehand: what remains of the
 /// samples at best is assumed there, and [`check_rest`] looks again when some layers tell more.
-fn check_disk(
-    arguments: &Voxelize,
-    compression: Compression,
-    stack_bytes: u64,
-) -> Result<(), Failure> {
-    /// The best ratio deflate reaches, on a constant layer.
-    const BEST: u64 = 1000;
-    let needed = if compression == Compression::None {
-        stack_bytes
-    } else {
-        stack_bytes / BEST
-    };
+fn check_disk(arguments: &Voxelize, least: u64) -> Result<(), Failure> {
     let available = available_bytes(&arguments.output)?;
-    refuse_beyond(arguments, needed, available)?;
+    refuse_beyond(arguments, least, available)?;
     Ok(())
 }
 
@@ -446,11 +424,11 @@ fn refuse_beyond(arguments: &Voxelize, needed: u64, available: u64) -> Result<()
 
 /// The layers in the order in which they are made, and how many come first: some of all heights, where what a layer takes
 /// on the disk is told by no more than its making.
-fn order(layers: usize, compression: Compression) -> (Vec<usize>, usize) {
+fn order(layers: usize, formats: &Formats) -> (Vec<usize>, usize) {
     /// Of a solid that starts at once, half of a step is missed or taken in excess: an 128th of its height.
     const FIRST: usize = 64;
     let count = (layers / 4).clamp(1, FIRST);
-    if compression == Compression::None || layers < 8 {
+    if !formats.are_compressed_slices() || layers < 8 {
         return ((0..layers).collect(), 0);
     }
     let first: Vec<usize> = (0..=count).map(|i| i * (layers - 1) / count).collect();
@@ -498,7 +476,7 @@ fn stream(
 ) -> Result<Streamed, Failure> {
     let workers = plan.workers;
     let layers = plan.grid.dims()[2];
-    let (order, first) = order(layers, plan.compression);
+    let (order, first) = order(layers, &plan.formats);
     let missing = AtomicUsize::new(first);
     let expected = Mutex::new(None);
     let bar = console.bar(layers as u64, "layers");
@@ -651,6 +629,7 @@ fn warnings(scene: &Scene, plan: &Plan, tally: Option<&Tally>) -> Vec<String> {
     let volume = said_of_volume(scene).map(str::to_owned);
     let said = scene.warnings().iter().cloned();
     said.chain(scene.grid_warning(&plan.grid))
+        .chain(plan.formats.warning(&plan.grid, &plan.channels))
         .chain(volume)
         .chain(tally.and_then(said_of_fractions))
         .collect()
@@ -762,7 +741,8 @@ fn document(
         "units": scene.model().units.name(),
         "bounds": [scene.bounds().min.to_array(), scene.bounds().max.to_array()],
         "channels": names,
-        "compression": plan.compression.name(),
+        "formats": plan.formats.names(),
+        "compression": plan.formats.compression().map(Compression::name),
         "files": manifest.map(|m| m.files.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()),
         "bytes": manifest.map(|m| m.files.iter().map(|f| f.bytes).sum::<u64>()),
         "bytes_uncompressed": plan.stack_bytes,
@@ -796,9 +776,10 @@ fn dry_run(
     let [nx, ny, nz] = plan.grid.dims();
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
     let text = format!(
-        "would write {nz} slices of {nx} x {ny} voxels ({}) to {}\nat most {} on disk, {} of memory for {} layers at a time\n",
+        "would write {nz} slices of {nx} x {ny} voxels ({}) to {} as {}\nat most {} on disk, {} of memory for {} layers at a time\n",
         names.join(", "),
         arguments.output.display(),
+        plan.formats.names().join(", "),
         output::bytes(plan.stack_bytes),
         output::bytes(plan.memory_bytes()),
         plan.workers,

@@ -1,0 +1,129 @@
+//! What stands before the arrays: the superblock, the groups, and the small arrays of coordinates.
+
+use super::object::{Attribute, FIXED_HEAD, Header, UNDEFINED, dataset, group, superblock};
+use crate::io::format::{Description, Element};
+
+/// The bytes before the arrays, and where these are.
+#[derive(Debug)]
+pub(super) struct Head {
+    pub(super) bytes: Vec<u8>,
+    /// Where each channel's array begins.
+    pub(super) arrays: Vec<u64>,
+    /// Bytes of the whole file.
+    pub(super) length: u64,
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Lays the file out. Headers have the same size whatever addresses are in them, so they are made twice: first to know
+/// how large they are.
+pub(super) fn of(of: &Description) -> Head {
+    let mut places = Places {
+        headers: vec![0; 3 + AXES.len() + of.channels.len()],
+        axes: [0; 3],
+        arrays: vec![0; of.channels.len()],
+    };
+    let mut at = FIXED_HEAD;
+    for (place, header) in headers(of, &places).iter().enumerate() {
+        places.headers[place] = at;
+        at = aligned(at + header.len() as u64);
+    }
+    for (axis, place) in places.axes.iter_mut().enumerate() {
+        *place = at;
+        at += 8 * of.grid.dims()[axis] as u64;
+    }
+    let start = at;
+    for (channel, place) in of.channels.iter().zip(&mut places.arrays) {
+        *place = at;
+        let layers = of.grid.dims()[2] as u64;
+        at = aligned(at + of.layer_bytes(channel) as u64 * layers);
+    }
+    let length = at;
+    let mut bytes = superblock(length, places.headers[0]);
+    for (place, header) in headers(of, &places).into_iter().enumerate() {
+        bytes.resize(places.headers[place] as usize, 0);
+        bytes.extend(header);
+    }
+    bytes.resize(places.axes[0] as usize, 0);
+    for axis in 0..3 {
+        let centres = (0..of.grid.dims()[axis]).map(|n| of.grid.centre_along(axis, n));
+        bytes.extend(centres.flat_map(f64::to_le_bytes));
+    }
+    debug_assert_eq!(bytes.len() as u64, start);
+    Head {
+        bytes,
+        arrays: places.arrays,
+        length,
+    }
+}
+
+fn aligned(at: u64) -> u64 {
+    at.next_multiple_of(8)
+}
+
+/// Addresses, all of them multiples of 8.
+struct Places {
+    /// The root group, `VTKHDF`, its `CellData`, the axes, the channels.
+    headers: Vec<u64>,
+    axes: [u64; 3],
+    arrays: Vec<u64>,
+}
+
+fn headers(of: &Description, places: &Places) -> Vec<Vec<u8>> {
+    let dims = of.grid.dims().map(|n| n as u64);
+    let [nx, ny, nz] = dims;
+    let channels = of.channels.iter().map(|c| c.name.as_str());
+    let (at_axes, at_channels) = places.headers[3..].split_at(AXES.len());
+    let of_channels: Vec<(&str, u64)> = channels.zip(at_channels.iter().copied()).collect();
+    let of_axes = AXES.into_iter().zip(at_axes.iter().copied());
+    let links: Vec<(&str, u64)> = (of_channels.iter().copied())
+        .chain(of_axes)
+        .chain([("VTKHDF", places.headers[1])])
+        .collect();
+    let origin = of.grid.origin().to_array();
+    let spacing = of.grid.spacing().to_array();
+    let mut root = Header::default();
+    group(&mut root, &links);
+    root.attribute("origin", &Attribute::Floats(&origin));
+    root.attribute("spacing", &Attribute::Floats(&spacing));
+    root.attribute("dims", &Attribute::Integers(&dims));
+    root.attribute("units", &Attribute::Text(&of.units));
+    root.attribute("sign_convention", &Attribute::Text(of.sign()));
+    if let Some(scene) = &of.scene {
+        root.attribute("scene", &Attribute::Text(&scene.name));
+        root.attribute("scene_hash", &Attribute::Text(&scene.hash));
+    }
+    let mut image = Header::default();
+    group(&mut image, &[("CellData", places.headers[2])]);
+    image.attribute("Version", &Attribute::Integers(&[1, 0]));
+    image.attribute("Type", &Attribute::Text("ImageData"));
+    image.attribute("WholeExtent", &Attribute::Integers(&[0, nx, 0, ny, 0, nz]));
+    image.attribute("Origin", &Attribute::Floats(&origin));
+    image.attribute("Spacing", &Attribute::Floats(&spacing));
+    let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    image.attribute("Direction", &Attribute::Floats(&identity));
+    let mut cells = Header::default();
+    group(&mut cells, &of_channels);
+    let mut headers = vec![root.finish(), image.finish(), cells.finish()];
+    for (axis, name) in AXES.iter().enumerate() {
+        let mut header = Header::default();
+        dataset(&mut header, Element::F64, &[dims[axis]], places.axes[axis]);
+        header.attribute(
+            "meaning",
+            &Attribute::Text(&format!("{name} of the voxel centres")),
+        );
+        header.attribute("units", &Attribute::Text(&of.units));
+        headers.push(header.finish());
+    }
+    for (channel, at) in of.channels.iter().zip(&places.arrays) {
+        let mut header = Header::default();
+        dataset(&mut header, Element::of(channel.kind), &[nz, ny, nx], *at);
+        header.attribute("meaning", &Attribute::Text(&channel.meaning));
+        if let Some(unit) = &channel.unit {
+            header.attribute("units", &Attribute::Text(unit));
+        }
+        headers.push(header.finish());
+    }
+    debug_assert!(!places.headers.contains(&UNDEFINED));
+    headers
+}

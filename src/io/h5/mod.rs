@@ -1,0 +1,87 @@
+//! HDF5: `NAME.h5`, an array for each channel, and a `VTKHDF` group that makes the same file an image for VTK.
+//!
+//! ```text
+//!   /                 attributes: origin, spacing, dims, units, sign_convention, scene
+//!   /sdf              (nz, ny, nx), contiguous; attributes: meaning, units
+//!   /x /y /z          voxel centres, f64
+//!   /VTKHDF           Version, Type, WholeExtent, Origin, Spacing, Direction
+//!   /VTKHDF/CellData  hard links to the arrays
+//! ```
+//!
+//! Every address is known before the first layer, so layers go to their places in any order.
+
+mod head;
+mod object;
+
+use super::error::IoError;
+use super::format::{
+    BUFFER, Description, Format, Layer, Needs, digest_bytes, little_endian, record,
+};
+use super::manifest::FileRecord;
+use super::staged::{FixedFile, StagedFiles};
+
+/// Names that are not a channel's.
+const OWN: [&str; 4] = ["VTKHDF", "x", "y", "z"];
+
+pub(super) fn check(of: &Description) -> Result<(), String> {
+    let taken = of.channels.iter().find(|c| OWN.contains(&c.name.as_str()));
+    taken.map_or(Ok(()), |channel| {
+        Err(format!(
+            "a channel named {:?} cannot be in an .h5 file, which has another array of that name; rename the field, or choose another format",
+            channel.name
+        ))
+    })
+}
+
+pub(super) fn needs(of: &Description) -> Needs {
+    let axes: u64 = of.grid.dims().iter().map(|n| 8 * *n as u64).sum();
+    let arrays = of.array_bytes();
+    // The head has about a kibibyte for each array.
+    let head = 8192 + 2048 * of.channels.len() as u64 + axes;
+    Needs {
+        disk: arrays.saturating_add(head),
+        disk_is_sure: true,
+        memory: digest_bytes(arrays) + 2 * head,
+        each: BUFFER,
+    }
+}
+
+/// The file in the making.
+#[derive(Debug)]
+pub(super) struct File {
+    file: FixedFile,
+    /// Where the samples of each array begin, and the bytes of a layer.
+    arrays: Vec<(u64, u64)>,
+}
+
+impl File {
+    pub(super) fn begin(files: &StagedFiles, of: &Description) -> Result<Self, IoError> {
+        let head = head::of(of);
+        let file = FixedFile::create(files, &of.whole_file("h5"), head.length)?;
+        file.write(0, &head.bytes)?;
+        let layers = of.channels.iter().map(|c| of.layer_bytes(c) as u64);
+        let arrays: Vec<(u64, u64)> = head.arrays.iter().copied().zip(layers).collect();
+        // What is between the arrays, so that each begins at a multiple of 8.
+        let count = of.grid.dims()[2] as u64;
+        for (n, (start, layer)) in arrays.iter().enumerate() {
+            let end = start + layer * count;
+            let next = arrays.get(n + 1).map_or(head.length, |next| next.0);
+            file.write(end, &[0; 8][..(next - end) as usize])?;
+        }
+        Ok(Self { file, arrays })
+    }
+}
+
+impl Format for File {
+    fn layer(&self, _files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
+        for ((start, bytes), (_, samples)) in self.arrays.iter().zip(layer.channels) {
+            let at = start + layer.k as u64 * bytes;
+            self.file.write(at, &little_endian(samples))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
+        Ok(vec![self.file.finish(files).map(record)?])
+    }
+}

@@ -1,0 +1,315 @@
+//! Nearly raw raster data: `CHANNEL.nrrd`, a header of lines and the samples after it.
+//!
+//! `space origin` is the centre of the first voxel. `space dimension` is given, and not a `space` of a patient: readers
+//! of medical images would turn the axes.
+//!
+//! A gzip stream is made of pieces that are compressed by themselves and end at a byte; since each begins with nothing
+//! to refer back to, they may be made at the same time and put one after the other.
+//!
+//! Source: Kindlmann, *Definition of NRRD File Format*; Deutsch, RFC 1951 and RFC 1952.
+
+use std::os::unix::fs::FileExt as _;
+use std::sync::{Mutex, PoisonError};
+
+use flate2::{Compress, Compression, Crc, FlushCompress, Status};
+
+use super::error::IoError;
+use super::format::{
+    BUFFER, Description, Element, Format, Layer, Needs, NrrdEncoding, decimal, digest_bytes,
+    little_endian, record,
+};
+use super::manifest::FileRecord;
+use super::raw::Array;
+use super::stack::ChannelSpec;
+use super::staged::{Groups, OrderedFile, StagedFiles};
+
+pub(super) fn needs(of: &Description, encoding: NrrdEncoding) -> Needs {
+    let arrays = of.array_bytes();
+    let heads = super::format::SMALL * of.channels.len() as u64;
+    match encoding {
+        NrrdEncoding::Raw => Needs {
+            disk: arrays.saturating_add(heads),
+            disk_is_sure: true,
+            memory: digest_bytes(arrays),
+            each: BUFFER,
+        },
+        NrrdEncoding::Gzip => Needs {
+            // Deflate adds 5 bytes to each 16 KiB that it cannot make smaller; what waits for its turn is there twice.
+            disk: (arrays + arrays / 1000).saturating_mul(2) + heads,
+            disk_is_sure: false,
+            memory: kept(of),
+            each: compressed_bytes(of),
+        },
+    }
+}
+
+/// Bytes that are kept of layers that are too small to be compressed by themselves.
+pub(super) fn kept(of: &Description) -> u64 {
+    let layers = of.grid.dims()[2];
+    let each = of.channels.iter();
+    each.map(|c| Groups::kept(of.layer_bytes(c), layers)).sum()
+}
+
+/// Bytes of the largest piece while it is compressed, the compressor's own state included.
+pub(super) fn compressed_bytes(of: &Description) -> u64 {
+    let layers = of.grid.dims()[2];
+    let largest = of.channels.iter().map(|c| {
+        let groups = Groups::new(of.layer_bytes(c), layers);
+        groups.piece_bytes() as u64
+    });
+    3 * largest.max().unwrap_or(0) / 2 + (1 << 20)
+}
+
+pub(super) fn begin(
+    files: &StagedFiles,
+    of: &Description,
+    encoding: NrrdEncoding,
+) -> Result<Box<dyn Format>, IoError> {
+    let name = |channel| of.channel_file(channel, "nrrd");
+    Ok(match encoding {
+        NrrdEncoding::Raw => {
+            let arrays = of.channels.iter().enumerate().map(|(n, channel)| {
+                let head = header(of, channel, "raw");
+                Array::begin(files, of, n, &name(channel), head.as_bytes())
+            });
+            Box::new(Plain(arrays.collect::<Result<_, _>>()?))
+        }
+        NrrdEncoding::Gzip => {
+            let streams = of.channels.iter().map(|channel| {
+                let head = header(of, channel, "gzip").into_bytes();
+                Stream::begin(files, of, channel, &name(channel), head)
+            });
+            Box::new(Gzipped(streams.collect::<Result<_, _>>()?))
+        }
+    })
+}
+
+/// Arrays as they are.
+#[derive(Debug)]
+struct Plain(Vec<Array>);
+
+impl Format for Plain {
+    fn layer(&self, _files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
+        for (array, (_, samples)) in self.0.iter().zip(layer.channels) {
+            array.layer(layer.k, &little_endian(samples))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
+        self.0
+            .into_iter()
+            .map(|array| array.finish(files))
+            .collect()
+    }
+}
+
+/// Arrays as gzip streams.
+#[derive(Debug)]
+struct Gzipped(Vec<Stream>);
+
+impl Format for Gzipped {
+    fn layer(&self, files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
+        for (stream, (_, samples)) in self.0.iter().zip(layer.channels) {
+            stream.layer(files, layer.k, &little_endian(samples))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
+        self.0
+            .into_iter()
+            .map(|stream| stream.finish(files))
+            .collect()
+    }
+}
+
+/// What a gzip stream begins with: deflate, no name, no time, an unknown system.
+const GZIP: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
+/// An empty last block of deflate.
+const LAST: [u8; 2] = [3, 0];
+
+/// One gzip stream in the making.
+#[derive(Debug)]
+struct Stream {
+    file: OrderedFile,
+    head: Vec<u8>,
+    groups: Groups,
+    checks: Mutex<Vec<Option<Crc>>>,
+}
+
+impl Stream {
+    fn begin(
+        files: &StagedFiles,
+        of: &Description,
+        channel: &ChannelSpec,
+        name: &str,
+        mut head: Vec<u8>,
+    ) -> Result<Self, IoError> {
+        head.extend(GZIP);
+        let groups = Groups::new(of.layer_bytes(channel), of.grid.dims()[2]);
+        Ok(Self {
+            file: OrderedFile::create(files, name, head.len() as u64)?,
+            head,
+            checks: Mutex::new((0..groups.count()).map(|_| None).collect()),
+            groups,
+        })
+    }
+
+    fn layer(&self, files: &StagedFiles, k: usize, bytes: &[u8]) -> Result<(), IoError> {
+        self.groups.add(k, bytes, |piece, bytes| {
+            let mut check = Crc::new();
+            check.update(bytes);
+            let compressed = deflated(bytes);
+            let mut checks = self.checks.lock().unwrap_or_else(PoisonError::into_inner);
+            checks[piece] = Some(check);
+            drop(checks);
+            self.file.add(files, piece, &compressed)
+        })
+    }
+
+    fn finish(self, files: &StagedFiles) -> Result<FileRecord, IoError> {
+        let mut whole = Crc::new();
+        let checks = self
+            .checks
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        checks
+            .iter()
+            .flatten()
+            .for_each(|check| whole.combine(check));
+        let tail = [
+            &LAST[..],
+            &whole.sum().to_le_bytes(),
+            &whole.amount().to_le_bytes(),
+        ]
+        .concat();
+        let ending = |file: &std::fs::File, end, _: &[u64]| {
+            file.write_all_at(&self.head, 0)?;
+            file.write_all_at(&tail, end)
+        };
+        self.file.finish(files, ending).map(record)
+    }
+}
+
+/// A piece of deflate that ends at a byte and refers to nothing before it.
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let mut deflate = Compress::new(Compression::new(6), false);
+    // Room for what cannot be made smaller, so that it seldom grows.
+    let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
+    loop {
+        let done = deflate.total_in() as usize;
+        let status = deflate.compress_vec(&bytes[done..], &mut out, FlushCompress::Sync);
+        // Room that is left says that the flush is complete.
+        let complete = deflate.total_in() as usize == bytes.len() && out.len() < out.capacity();
+        if complete || matches!(status, Ok(Status::StreamEnd) | Err(_)) {
+            return out;
+        }
+        out.reserve(bytes.len() / 8 + 1024);
+    }
+}
+
+fn header(of: &Description, channel: &ChannelSpec, encoding: &str) -> String {
+    let lattice = of.lattice();
+    let kind = match Element::of(channel.kind) {
+        Element::U8 => "uint8",
+        Element::U32 => "uint32",
+        Element::F32 => "float",
+        Element::F64 => "double",
+    };
+    let [nx, ny, nz] = lattice.dims;
+    let [dx, dy, dz] = lattice.spacing.map(decimal);
+    let [x, y, z] = lattice.first.map(decimal);
+    let units = &of.units;
+    format!(
+        "NRRD0005\n\
+         # {}, {} of {}\n\
+         type: {kind}\n\
+         dimension: 3\n\
+         space dimension: 3\n\
+         sizes: {nx} {ny} {nz}\n\
+         space directions: ({dx},0,0) (0,{dy},0) (0,0,{dz})\n\
+         kinds: domain domain domain\n\
+         centers: cell cell cell\n\
+         endian: little\n\
+         encoding: {encoding}\n\
+         space units: \"{units}\" \"{units}\" \"{units}\"\n\
+         space origin: ({x},{y},{z})\n\
+         units:={units}\n\
+         sign_convention:={}\n\
+         \n",
+        concat!("voxlathe ", env!("CARGO_PKG_VERSION")),
+        channel.name,
+        of.name(),
+        of.sign(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::exr::SampleKind;
+    use crate::io::format::FormatKind;
+    use crate::io::format::tests::{description, float, orders, written};
+    use std::io::Read as _;
+
+    #[test]
+    fn one_stream_holds_all_pieces() {
+        let of = description(&[("sdf", SampleKind::Float)]);
+        let samples: Vec<u8> = (0..385).flat_map(|n| float(n).to_le_bytes()).collect();
+        for order in orders(11) {
+            for encoding in [NrrdEncoding::Raw, NrrdEncoding::Gzip] {
+                let dir = tempfile::tempdir().unwrap();
+                written(dir.path(), FormatKind::Nrrd(encoding), &of, &order);
+                let bytes = std::fs::read(dir.path().join("sdf.nrrd")).unwrap();
+                let end = bytes.windows(2).position(|w| w == b"\n\n").unwrap() + 2;
+                let text = std::str::from_utf8(&bytes[..end]).unwrap();
+                assert!(
+                    text.contains("\nspace origin: (-1.0,0.25,7.35)\n"),
+                    "{text}"
+                );
+                assert!(text.contains("\nsizes: 7 5 11\n"));
+                let mut found = Vec::new();
+                match encoding {
+                    NrrdEncoding::Raw => found.extend(&bytes[end..]),
+                    NrrdEncoding::Gzip => {
+                        let mut stream = flate2::bufread::GzDecoder::new(&bytes[end..]);
+                        stream.read_to_end(&mut found).unwrap();
+                        assert!(stream.into_inner().is_empty());
+                    }
+                }
+                assert_eq!(found, samples);
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_of_any_bytes_can_be_put_together() {
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 56) as u8
+        };
+        let pieces: Vec<Vec<u8>> = [0, 1, 5, 1000, 300_000, 70_000]
+            .map(|n| {
+                (0..n)
+                    .map(|i| {
+                        if n == 1000 {
+                            7
+                        } else {
+                            random() ^ (i % 2) as u8
+                        }
+                    })
+                    .collect()
+            })
+            .to_vec();
+        let mut stream: Vec<u8> = pieces.iter().flat_map(|p| deflated(p)).collect();
+        stream.extend(LAST);
+        let mut found = Vec::new();
+        let mut reader = flate2::bufread::DeflateDecoder::new(&stream[..]);
+        reader.read_to_end(&mut found).unwrap();
+        assert_eq!(found, pieces.concat());
+    }
+}
