@@ -545,3 +545,184 @@ fn a_limit_on_the_size_of_files_leaves_the_older_output() {
         assert!(failed > 0, "{format}");
     }
 }
+
+/// A measurement: how fast each format is written from layers in memory, against plain writes of files of the same sizes
+/// by as many threads, synced and renamed as these are.
+///
+/// `VOXLATHE_SIDE` sets the resolution, `VOXLATHE_THREADS` the threads.
+#[test]
+#[ignore = "a measurement"]
+fn formats_are_written_as_fast_as_plain_files() {
+    use voxlathe::io::exr::{Compression, Samples};
+    use voxlathe::io::format::{FormatKind, H5Codec, NrrdEncoding, VtiEncoding, ZarrCodec};
+    use voxlathe::io::stack::{ChannelSpec, StackOptions, StackSummary};
+    use voxlathe::{grid::Channel, io::StackWriter, sample::*};
+
+    let number = |name: &str, default: usize| {
+        std::env::var(name).map_or(default, |v| v.parse().expect("a number"))
+    };
+    let (side, threads) = (number("VOXLATHE_SIDE", 512), number("VOXLATHE_THREADS", 2));
+    let set = [("grid.resolution".to_owned(), side.to_string())];
+    let set: Vec<String> = set.iter().map(|(k, v)| format!("{k}={v}")).collect();
+    let scene = voxlathe::Scene::load_with(shipped("goblet"), &set).expect("a scene");
+    let grid = scene.grid().expect("a grid");
+    let channels = [Channel::Occupancy, Channel::Sdf, Channel::Fraction];
+    let selection = Selection::of(&channels, None);
+    let sampler = LayerSampler::new(scene.assembly(), &grid, selection);
+    let layers = grid.dims()[2];
+    let sampled: Vec<LayerBuffers> = (0..layers)
+        .map(|k| {
+            let mut buffers = LayerBuffers::default();
+            sampler.sample(k, &mut buffers);
+            buffers
+        })
+        .collect();
+    let near = 3.0 * grid.spacing().max_element() as f32;
+    let band: usize = sampled
+        .iter()
+        .flat_map(|l| &l.sdf)
+        .filter(|d| d.abs() < near)
+        .count();
+    let each = |work: &(dyn Fn(usize) + Sync), count: usize| {
+        let next = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    loop {
+                        let n = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                        if n >= count {
+                            break;
+                        }
+                        work(n);
+                    }
+                });
+            }
+        });
+    };
+    let place = std::env::var("VOXLATHE_PLACE")
+        .unwrap_or_else(|_| std::env::temp_dir().display().to_string());
+    let t = tempfile::tempdir_in(place).expect("a directory");
+    let write = |kind: FormatKind| {
+        let out = t.path().join("out");
+        let _ = fs::remove_dir_all(&out);
+        let begin = std::time::Instant::now();
+        let specs = channels.map(|c| ChannelSpec::of(c, "mm")).to_vec();
+        let options = StackOptions {
+            formats: vec![kind],
+            ..StackOptions::default()
+        };
+        let writer = StackWriter::create(&out, &grid, specs, options).expect("a writer");
+        let one = |k: usize| {
+            let layer = [
+                ("occupancy", Samples::Half(&sampled[k].occupancy)),
+                ("sdf", Samples::Float(&sampled[k].sdf)),
+                ("fraction", Samples::Float(&sampled[k].fraction)),
+            ];
+            writer.write_layer(k, &layer).expect("a layer");
+        };
+        each(&one, layers);
+        let manifest = writer.finish(StackSummary::default()).expect("a stack");
+        let took = begin.elapsed().as_secs_f64();
+        fs::remove_dir_all(&out).expect("removed");
+        let sizes: Vec<u64> = manifest.files.iter().map(|f| f.bytes).collect();
+        (took, sizes)
+    };
+    // From as much memory as the samples take.
+    let content: Vec<u8> = (0..256_u32 << 20)
+        .map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8)
+        .collect();
+    let plain = |sizes: &[u64]| {
+        use std::os::unix::fs::FileExt as _;
+        const PIECE: u64 = 1 << 20;
+        let out = t.path().join("plain");
+        let _ = fs::remove_dir_all(&out);
+        let begin = std::time::Instant::now();
+        fs::create_dir_all(out.join("new")).expect("a directory");
+        let pieces: Vec<(usize, u64)> = sizes
+            .iter()
+            .enumerate()
+            .flat_map(|(n, size)| (0..*size).step_by(PIECE as usize).map(move |at| (n, at)))
+            .collect();
+        let files: Vec<std::sync::OnceLock<fs::File>> =
+            sizes.iter().map(|_| Default::default()).collect();
+        let left: Vec<std::sync::atomic::AtomicU64> = sizes
+            .iter()
+            .map(|s| std::sync::atomic::AtomicU64::new(s.div_ceil(PIECE)))
+            .collect();
+        each(
+            &|n| {
+                let (number, at) = pieces[n];
+                let path = out.join("new").join(number.to_string());
+                let file = files[number].get_or_init(|| fs::File::create(path).expect("a file"));
+                let count = PIECE.min(sizes[number] - at) as usize;
+                let from = (n << 20) % (content.len() - (1 << 20));
+                file.write_all_at(&content[from..from + count], at)
+                    .expect("written");
+                if left[number].fetch_sub(1, std::sync::atomic::Ordering::AcqRel) == 1 {
+                    file.sync_all().expect("synced");
+                }
+            },
+            pieces.len(),
+        );
+        for number in 0..sizes.len() {
+            let name = number.to_string();
+            fs::rename(out.join("new").join(&name), out.join(&name)).expect("renamed");
+        }
+        fs::File::open(&out)
+            .and_then(|d| d.sync_all())
+            .expect("synced");
+        let took = begin.elapsed().as_secs_f64();
+        fs::remove_dir_all(&out).expect("removed");
+        took
+    };
+    let half_width = f64::from(near);
+    let cells = |encoding| FormatKind::Vti {
+        encoding,
+        points: false,
+    };
+    println!(
+        "{:?}, {layers} layers, {band} voxels in the band, {threads} threads",
+        grid.dims()
+    );
+    println!(
+        "{:<12} {:>8} {:>8} {:>8} {:>6}",
+        "format", "MB", "s", "plain s", "ratio"
+    );
+    for (name, kind) in [
+        ("exr", FormatKind::Exr(Compression::None)),
+        ("vti", cells(VtiEncoding::Raw)),
+        ("vti base64", cells(VtiEncoding::Base64)),
+        ("vti zlib", cells(VtiEncoding::Zlib)),
+        ("npy", FormatKind::Npy),
+        ("nrrd", FormatKind::Nrrd(NrrdEncoding::Raw)),
+        ("nrrd gzip", FormatKind::Nrrd(NrrdEncoding::Gzip)),
+        ("mhd", FormatKind::Mhd),
+        ("raw", FormatKind::Raw),
+        ("zarr", FormatKind::Zarr(ZarrCodec::None)),
+        ("zarr zstd", FormatKind::Zarr(ZarrCodec::Zstd)),
+        ("h5", FormatKind::H5(H5Codec::None)),
+        ("vdb", FormatKind::Vdb { half_width }),
+    ] {
+        let rounds = if name.contains(' ') { 1 } else { 5 };
+        let mut times: Vec<[f64; 2]> = (0..rounds)
+            .map(|_| {
+                let (took, sizes) = write(kind);
+                [took, plain(&sizes)]
+            })
+            .collect();
+        let bytes: u64 = write(kind).1.iter().sum();
+        let mut median = |n: usize| {
+            times.sort_by(|a, b| a[n].total_cmp(&b[n]));
+            times[times.len() / 2][n]
+        };
+        let [own, twin] = [median(0), median(1)];
+        println!(
+            "{name:<12} {:>8.0} {own:>8.2} {twin:>8.2} {:>6.2}",
+            bytes as f64 / 1e6,
+            twin / own
+        );
+        if name == "vdb" {
+            println!("vdb: {:.1e} voxels of the band a second", band as f64 / own);
+        }
+    }
+}

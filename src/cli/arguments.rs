@@ -166,7 +166,7 @@ pub(super) struct Voxelize {
     pub(super) zarr_codec: ZarrFlag,
     /// How .h5 arrays are compressed
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
-    pub(super) h5_codec: H5Codec,
+    pub(super) h5_codec: H5Flag,
     /// Of all but occupancy and material, in npy, nrrd, mhd, raw, vti, zarr and h5
     #[arg(long, value_name = "TYPE", value_enum, default_value_t)]
     pub(super) precision: Precision,
@@ -220,7 +220,7 @@ pub(super) enum ZarrFlag {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(super) enum H5Codec {
+pub(super) enum H5Flag {
     /// Not at all
     #[default]
     None,

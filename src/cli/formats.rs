@@ -1,10 +1,12 @@
 //! What `--formats`, the flags of each format and the name of the output come to.
 
-use super::arguments::{H5Codec, NrrdFlag, Precision, Voxelize, VtiFlag, ZarrFlag};
+use super::arguments::{H5Flag, NrrdFlag, Precision, Voxelize, VtiFlag, ZarrFlag};
 use super::failure::Failure;
 use crate::grid::GridSpec;
 use crate::io::exr::{Compression, SampleKind};
-use crate::io::format::{Description, FormatKind, Needs, NrrdEncoding, VtiEncoding, ZarrCodec};
+use crate::io::format::{
+    Description, FormatKind, H5Codec, Needs, NrrdEncoding, VtiEncoding, ZarrCodec,
+};
 use crate::io::stack::{ChannelSpec, SceneLabel, largest_manifest_bytes};
 use crate::scene::{CompressionName, FormatName, Scene};
 
@@ -136,10 +138,10 @@ fn single(arguments: &Voxelize) -> Result<Option<FormatName>, Failure> {
 
 /// Refuses what this build, or these channels, cannot have.
 fn check_codecs(arguments: &Voxelize, channels: &[ChannelSpec]) -> Result<(), Failure> {
-    if arguments.h5_codec == H5Codec::Gzip {
+    if arguments.h5_codec == H5Flag::Gzip && !cfg!(feature = "hdf5") {
         return Err(Failure::usage(
-            "--h5-codec gzip: this build writes HDF5 without the library that compresses it; take a build with the feature \
-             hdf5, or --h5-codec none and `h5repack -f GZIP=6 NAME.h5 SMALL.h5` afterwards",
+            "--h5-codec gzip: this build has not the feature hdf5; build one that has, by cargo install --path . --features \
+             hdf5, or take --h5-codec none and h5repack -f GZIP=6 afterwards",
         ));
     }
     let single: Vec<&str> = channels
@@ -193,8 +195,22 @@ fn kind(
         FormatName::Vdb => FormatKind::Vdb {
             half_width: output.band.unwrap_or(HALF_WIDTH) * grid.spacing().max_element(),
         },
-        FormatName::H5 => FormatKind::H5,
+        FormatName::H5 => FormatKind::H5(h5_codec(arguments)),
     }
+}
+
+#[cfg(feature = "hdf5")]
+fn h5_codec(arguments: &Voxelize) -> H5Codec {
+    match arguments.h5_codec {
+        H5Flag::None => H5Codec::None,
+        H5Flag::Gzip => H5Codec::Gzip,
+    }
+}
+
+/// The only one that such a build has; [`check_codecs`] has refused the other.
+#[cfg(not(feature = "hdf5"))]
+fn h5_codec(_arguments: &Voxelize) -> H5Codec {
+    H5Codec::None
 }
 
 fn compression(name: CompressionName) -> Compression {

@@ -112,6 +112,17 @@ pub enum ZarrCodec {
     Zstd,
 }
 
+/// How `.h5` files hold their arrays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum H5Codec {
+    /// Contiguous, as they are.
+    #[default]
+    None,
+    /// In chunks of layers, by deflate.
+    #[cfg(feature = "hdf5")]
+    Gzip,
+}
+
 /// A file format, and how it is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FormatKind {
@@ -140,7 +151,7 @@ pub enum FormatKind {
         half_width: f64,
     },
     /// HDF5, with a `VTKHDF` group.
-    H5,
+    H5(H5Codec),
 }
 
 impl FormatKind {
@@ -156,7 +167,7 @@ impl FormatKind {
             Self::Raw => "raw",
             Self::Zarr(_) => "zarr",
             Self::Vdb { .. } => "vdb",
-            Self::H5 => "h5",
+            Self::H5(_) => "h5",
         }
     }
 
@@ -170,7 +181,7 @@ impl FormatKind {
             Self::Nrrd(encoding) => nrrd::needs(of, encoding),
             Self::Zarr(codec) => zarr::needs(of, codec),
             Self::Vdb { .. } => vdb::needs(of),
-            Self::H5 => h5::needs(of),
+            Self::H5(codec) => h5::needs(of, codec),
         }
     }
 
@@ -207,7 +218,7 @@ impl FormatKind {
     pub fn check(&self, of: &Description) -> Result<(), String> {
         match self {
             Self::Vdb { half_width } => vdb::check(of, *half_width),
-            Self::H5 => h5::check(of),
+            Self::H5(_) => h5::check(of),
             _ => Ok(()),
         }
     }
@@ -426,7 +437,7 @@ pub(super) fn begin(
             FormatKind::Raw => Box::new(raw::Arrays::begin(files, of, !has_raw)?),
             FormatKind::Zarr(codec) => Box::new(zarr::Group::begin(files, of, codec)?),
             FormatKind::Vdb { half_width } => Box::new(vdb::Grids::begin(files, of, half_width)?),
-            FormatKind::H5 => Box::new(h5::File::begin(files, of)?),
+            FormatKind::H5(codec) => h5::begin(files, of, codec)?,
         });
         has_raw |= matches!(kind, FormatKind::Mhd | FormatKind::Raw);
         if matches!(kind, FormatKind::Npy | FormatKind::Raw) && !has_grid {
@@ -564,7 +575,7 @@ pub(super) mod tests {
         FormatKind::Raw,
         FormatKind::Zarr(ZarrCodec::None),
         FormatKind::Zarr(ZarrCodec::Zstd),
-        FormatKind::H5,
+        FormatKind::H5(H5Codec::None),
     ];
 
     #[test]

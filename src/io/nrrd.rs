@@ -11,8 +11,9 @@
 use std::os::unix::fs::FileExt as _;
 use std::sync::{Mutex, PoisonError};
 
-use flate2::{Compress, Compression, Crc, FlushCompress, Status};
+use flate2::Crc;
 
+use super::deflate;
 use super::error::IoError;
 use super::format::{
     BUFFER, Description, Element, Format, Layer, Needs, NrrdEncoding, decimal, digest_bytes,
@@ -126,8 +127,6 @@ impl Format for Gzipped {
 
 /// What a gzip stream begins with: deflate, no name, no time, an unknown system.
 const GZIP: [u8; 10] = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
-/// An empty last block of deflate.
-const LAST: [u8; 2] = [3, 0];
 
 /// One gzip stream in the making.
 #[derive(Debug)]
@@ -160,7 +159,7 @@ impl Stream {
         self.groups.add(k, bytes, |piece, bytes| {
             let mut check = Crc::new();
             check.update(bytes);
-            let compressed = deflated(bytes);
+            let compressed = deflate::piece(bytes);
             let mut checks = self.checks.lock().unwrap_or_else(PoisonError::into_inner);
             checks[piece] = Some(check);
             drop(checks);
@@ -179,7 +178,7 @@ impl Stream {
             .flatten()
             .for_each(|check| whole.combine(check));
         let tail = [
-            &LAST[..],
+            &deflate::LAST[..],
             &whole.sum().to_le_bytes(),
             &whole.amount().to_le_bytes(),
         ]
@@ -189,23 +188,6 @@ impl Stream {
             file.write_all_at(&tail, end)
         };
         self.file.finish(files, ending).map(record)
-    }
-}
-
-/// A piece of deflate that ends at a byte and refers to nothing before it.
-fn deflated(bytes: &[u8]) -> Vec<u8> {
-    let mut deflate = Compress::new(Compression::new(6), false);
-    // Room for what cannot be made smaller, so that it seldom grows.
-    let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
-    loop {
-        let done = deflate.total_in() as usize;
-        let status = deflate.compress_vec(&bytes[done..], &mut out, FlushCompress::Sync);
-        // Room that is left says that the flush is complete.
-        let complete = deflate.total_in() as usize == bytes.len() && out.len() < out.capacity();
-        if complete || matches!(status, Ok(Status::StreamEnd) | Err(_)) {
-            return out;
-        }
-        out.reserve(bytes.len() / 8 + 1024);
     }
 }
 
@@ -281,35 +263,5 @@ mod tests {
                 assert_eq!(found, samples);
             }
         }
-    }
-
-    #[test]
-    fn pieces_of_any_bytes_can_be_put_together() {
-        let mut state = 1_u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 56) as u8
-        };
-        let pieces: Vec<Vec<u8>> = [0, 1, 5, 1000, 300_000, 70_000]
-            .map(|n| {
-                (0..n)
-                    .map(|i| {
-                        if n == 1000 {
-                            7
-                        } else {
-                            random() ^ (i % 2) as u8
-                        }
-                    })
-                    .collect()
-            })
-            .to_vec();
-        let mut stream: Vec<u8> = pieces.iter().flat_map(|p| deflated(p)).collect();
-        stream.extend(LAST);
-        let mut found = Vec::new();
-        let mut reader = flate2::bufread::DeflateDecoder::new(&stream[..]);
-        reader.read_to_end(&mut found).unwrap();
-        assert_eq!(found, pieces.concat());
     }
 }

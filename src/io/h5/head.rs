@@ -1,5 +1,7 @@
 //! What stands before the arrays: the superblock, the groups, and the small arrays of coordinates.
 
+#[cfg(feature = "hdf5")]
+use super::object::chunked_dataset;
 use super::object::{Attribute, FIXED_HEAD, Header, UNDEFINED, dataset, group, superblock};
 use crate::io::format::{Description, Element};
 
@@ -13,18 +15,31 @@ pub(super) struct Head {
     pub(super) length: u64,
 }
 
+/// How the channels' arrays are held.
+#[derive(Debug)]
+pub(super) enum Held {
+    Contiguous,
+    /// In chunks of so many layers, found by trees at these places in a file of this length.
+    #[cfg(feature = "hdf5")]
+    Chunks {
+        layers: u64,
+        trees: Vec<u64>,
+        length: u64,
+    },
+}
+
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Lays the file out. Headers have the same size whatever addresses are in them, so they are made twice: first to know
 /// how large they are.
-pub(super) fn of(of: &Description) -> Head {
+pub(super) fn of(of: &Description, held: &Held) -> Head {
     let mut places = Places {
         headers: vec![0; 3 + AXES.len() + of.channels.len()],
         axes: [0; 3],
         arrays: vec![0; of.channels.len()],
     };
     let mut at = FIXED_HEAD;
-    for (place, header) in headers(of, &places).iter().enumerate() {
+    for (place, header) in headers(of, held, &places).iter().enumerate() {
         places.headers[place] = at;
         at = aligned(at + header.len() as u64);
     }
@@ -33,14 +48,23 @@ pub(super) fn of(of: &Description) -> Head {
         at += 8 * of.grid.dims()[axis] as u64;
     }
     let start = at;
-    for (channel, place) in of.channels.iter().zip(&mut places.arrays) {
-        *place = at;
-        let layers = of.grid.dims()[2] as u64;
-        at = aligned(at + of.layer_bytes(channel) as u64 * layers);
-    }
-    let length = at;
+    let length = match held {
+        Held::Contiguous => {
+            for (channel, place) in of.channels.iter().zip(&mut places.arrays) {
+                *place = at;
+                let layers = of.grid.dims()[2] as u64;
+                at = aligned(at + of.layer_bytes(channel) as u64 * layers);
+            }
+            at
+        }
+        #[cfg(feature = "hdf5")]
+        Held::Chunks { trees, length, .. } => {
+            places.arrays.clone_from(trees);
+            *length
+        }
+    };
     let mut bytes = superblock(length, places.headers[0]);
-    for (place, header) in headers(of, &places).into_iter().enumerate() {
+    for (place, header) in headers(of, held, &places).into_iter().enumerate() {
         bytes.resize(places.headers[place] as usize, 0);
         bytes.extend(header);
     }
@@ -69,7 +93,7 @@ struct Places {
     arrays: Vec<u64>,
 }
 
-fn headers(of: &Description, places: &Places) -> Vec<Vec<u8>> {
+fn headers(of: &Description, held: &Held, places: &Places) -> Vec<Vec<u8>> {
     let dims = of.grid.dims().map(|n| n as u64);
     let [nx, ny, nz] = dims;
     let channels = of.channels.iter().map(|c| c.name.as_str());
@@ -117,7 +141,15 @@ fn headers(of: &Description, places: &Places) -> Vec<Vec<u8>> {
     }
     for (channel, at) in of.channels.iter().zip(&places.arrays) {
         let mut header = Header::default();
-        dataset(&mut header, Element::of(channel.kind), &[nz, ny, nx], *at);
+        let element = Element::of(channel.kind);
+        match held {
+            Held::Contiguous => dataset(&mut header, element, &[nz, ny, nx], *at),
+            #[cfg(feature = "hdf5")]
+            Held::Chunks { layers, .. } => {
+                let chunk = [*layers, ny, nx];
+                chunked_dataset(&mut header, element, &[nz, ny, nx], &chunk, *at);
+            }
+        }
         header.attribute("meaning", &Attribute::Text(&channel.meaning));
         if let Some(unit) = &channel.unit {
             header.attribute("units", &Attribute::Text(unit));

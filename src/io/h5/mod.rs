@@ -8,17 +8,21 @@
 //!   /VTKHDF/CellData  hard links to the arrays
 //! ```
 //!
-//! Every address is known before the first layer, so layers go to their places in any order.
+//! Every address is known before the first layer, so layers go to their places in any order. With `--h5-codec gzip`,
+//! which the feature `hdf5` has, arrays are chunks of some layers, found by a tree that comes last.
 
+#[cfg(feature = "hdf5")]
+mod chunked;
 mod head;
 mod object;
 
 use super::error::IoError;
 use super::format::{
-    BUFFER, Description, Format, Layer, Needs, digest_bytes, little_endian, record,
+    BUFFER, Description, Format, H5Codec, Layer, Needs, digest_bytes, little_endian, record,
 };
 use super::manifest::FileRecord;
 use super::staged::{FixedFile, StagedFiles};
+use head::Held;
 
 /// Names that are not a channel's.
 const OWN: [&str; 4] = ["VTKHDF", "x", "y", "z"];
@@ -33,30 +37,46 @@ pub(super) fn check(of: &Description) -> Result<(), String> {
     })
 }
 
-pub(super) fn needs(of: &Description) -> Needs {
+pub(super) fn needs(of: &Description, codec: H5Codec) -> Needs {
     let axes: u64 = of.grid.dims().iter().map(|n| 8 * *n as u64).sum();
     let arrays = of.array_bytes();
     // The head has about a kibibyte for each array.
     let head = 8192 + 2048 * of.channels.len() as u64 + axes;
-    Needs {
-        disk: arrays.saturating_add(head),
-        disk_is_sure: true,
-        memory: digest_bytes(arrays) + 2 * head,
-        each: BUFFER,
+    match codec {
+        H5Codec::None => Needs {
+            disk: arrays.saturating_add(head),
+            disk_is_sure: true,
+            memory: digest_bytes(arrays) + 2 * head,
+            each: BUFFER,
+        },
+        #[cfg(feature = "hdf5")]
+        H5Codec::Gzip => chunked::needs(of, head),
     }
+}
+
+pub(super) fn begin(
+    files: &StagedFiles,
+    of: &Description,
+    codec: H5Codec,
+) -> Result<Box<dyn Format>, IoError> {
+    Ok(match codec {
+        H5Codec::None => Box::new(File::begin(files, of)?),
+        #[cfg(feature = "hdf5")]
+        H5Codec::Gzip => Box::new(chunked::File::begin(files, of)?),
+    })
 }
 
 /// The file in the making.
 #[derive(Debug)]
-pub(super) struct File {
+struct File {
     file: FixedFile,
     /// Where the samples of each array begin, and the bytes of a layer.
     arrays: Vec<(u64, u64)>,
 }
 
 impl File {
-    pub(super) fn begin(files: &StagedFiles, of: &Description) -> Result<Self, IoError> {
-        let head = head::of(of);
+    fn begin(files: &StagedFiles, of: &Description) -> Result<Self, IoError> {
+        let head = head::of(of, &Held::Contiguous);
         let file = FixedFile::create(files, &of.whole_file("h5"), head.length)?;
         file.write(0, &head.bytes)?;
         let layers = of.channels.iter().map(|c| of.layer_bytes(c) as u64);

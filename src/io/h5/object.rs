@@ -127,14 +127,8 @@ pub(super) fn group(header: &mut Header, links: &[(&str, u64)]) {
 
 /// The messages of an array that is contiguous at `address`.
 pub(super) fn dataset(header: &mut Header, stored: Element, dims: &[u64], address: u64) {
-    let kind: &[u8] = match stored {
-        Element::U8 => &UINT8,
-        Element::U32 => &UINT32,
-        Element::F32 => &F32,
-        Element::F64 => &F64,
-    };
     header.message(0x01, 0, &simple(dims));
-    header.message(0x03, 1, kind);
+    header.message(0x03, 1, number(stored));
     // Version 3; space is there late, and filled where somebody says so.
     header.message(0x05, 1, &[3, 0x0a]);
     let mut layout = vec![3, 1];
@@ -142,6 +136,48 @@ pub(super) fn dataset(header: &mut Header, stored: Element, dims: &[u64], addres
     let count: u64 = dims.iter().product();
     layout.extend((count * stored.bytes() as u64).to_le_bytes());
     header.message(0x08, 0, &layout);
+}
+
+/// The messages of an array in deflated chunks, which the tree at `address` finds.
+#[cfg(feature = "hdf5")]
+pub(super) fn chunked_dataset(
+    header: &mut Header,
+    stored: Element,
+    dims: &[u64],
+    chunk: &[u64],
+    address: u64,
+) {
+    header.message(0x01, 0, &simple(dims));
+    header.message(0x03, 1, number(stored));
+    // Version 3; space comes with the chunks, and is filled where somebody says so.
+    header.message(0x05, 1, &[3, 0x0b]);
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "at most three, and checked to fit"
+    )]
+    let mut layout = vec![3, 2, chunk.len() as u8 + 1];
+    layout.extend(address.to_le_bytes());
+    #[allow(clippy::cast_possible_truncation, reason = "sides of grids")]
+    let sides = chunk
+        .iter()
+        .map(|n| *n as u32)
+        .chain([stored.bytes() as u32]);
+    layout.extend(sides.flat_map(u32::to_le_bytes));
+    header.message(0x08, 0, &layout);
+    // Version 2; one filter: deflate, which must be there, and its level.
+    let mut filter = vec![2, 1, 1, 0, 0, 0, 1, 0];
+    filter.extend(crate::io::deflate::LEVEL.to_le_bytes());
+    header.message(0x0b, 1, &filter);
+}
+
+/// The message of an element's type.
+fn number(stored: Element) -> &'static [u8] {
+    match stored {
+        Element::U8 => &UINT8,
+        Element::U32 => &UINT32,
+        Element::F32 => &F32,
+        Element::F64 => &F64,
+    }
 }
 
 fn simple(dims: &[u64]) -> Vec<u8> {

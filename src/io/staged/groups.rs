@@ -28,15 +28,22 @@ struct Open {
 
 impl Groups {
     pub(in super::super) fn new(layer_bytes: usize, layers: usize) -> Self {
+        let each = Self::layers_of_each(layer_bytes, layers);
+        Self::of_layers(each, layer_bytes, layers)
+    }
+
+    /// Pieces of `each` layers.
+    pub(in super::super) fn of_layers(each: usize, layer_bytes: usize, layers: usize) -> Self {
         Self {
             layer_bytes,
             layers,
-            each: Self::layers_of_each(layer_bytes, layers),
+            each,
             open: Mutex::default(),
         }
     }
 
-    fn layers_of_each(layer_bytes: usize, layers: usize) -> usize {
+    /// Layers that are worth compressing together.
+    pub(in super::super) fn layers_of_each(layer_bytes: usize, layers: usize) -> usize {
         WORTH.div_ceil(layer_bytes.max(1)).clamp(1, layers)
     }
 

@@ -7,16 +7,12 @@ use std::fs::File;
 use std::io::{self, Seek as _, SeekFrom};
 use std::os::unix::fs::FileExt as _;
 
-use flate2::{Compress, Compression, FlushCompress, Status};
-
 use super::head::{self, Held, TAIL};
+use crate::io::deflate;
 use crate::io::error::IoError;
 use crate::io::format::{Description, Format, Layer, little_endian, record};
 use crate::io::manifest::FileRecord;
 use crate::io::staged::{Groups, OrderedFile, Pieces, StagedFiles};
-
-/// As VTK's own writer compresses, or a little better.
-const LEVEL: u32 = 6;
 
 #[derive(Debug)]
 pub(super) struct Blocks {
@@ -91,30 +87,16 @@ fn table(groups: &Groups, sizes: &[u64]) -> Vec<u8> {
     numbers.flat_map(|n| n.to_le_bytes()).collect()
 }
 
-/// A block by itself.
-fn deflated(bytes: &[u8]) -> Vec<u8> {
-    let mut deflate = Compress::new(Compression::new(LEVEL), true);
-    let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
-    loop {
-        let done = deflate.total_in() as usize;
-        let status = deflate.compress_vec(&bytes[done..], &mut out, FlushCompress::Finish);
-        if matches!(status, Ok(Status::StreamEnd) | Err(_)) {
-            return out;
-        }
-        out.reserve(bytes.len() / 8 + 1024);
-    }
-}
-
 impl Format for Blocks {
     fn layer(&self, files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
         for (n, (_, samples)) in layer.channels.iter().enumerate() {
             let bytes = little_endian(samples);
             match n.checked_sub(1).map(|n| &self.others[n]) {
                 None => self.first_groups.add(layer.k, &bytes, |piece, bytes| {
-                    self.first.add(files, piece, &deflated(bytes))
+                    self.first.add(files, piece, &deflate::zlib(bytes))
                 })?,
                 Some(other) => other.groups.add(layer.k, &bytes, |piece, bytes| {
-                    (other.pieces).add(files, &other.room, piece, &deflated(bytes))
+                    (other.pieces).add(files, &other.room, piece, &deflate::zlib(bytes))
                 })?,
             }
         }
