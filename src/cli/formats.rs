@@ -36,13 +36,11 @@ impl Formats {
         channels: &[ChannelSpec],
     ) -> Result<Self, Failure> {
         check_codecs(arguments, channels)?;
-        let single = single(arguments)?;
-        let output = &scene.model().output;
-        let kind = |name| kind(name, scene, arguments, grid, channels);
-        let kinds: Vec<FormatKind> = match single {
-            Some(name) => vec![kind(name)],
-            None => output.formats.iter().map(|name| kind(*name)).collect(),
-        };
+        let is_single = single(arguments)?.is_some();
+        let names = scene.model().output.formats.iter();
+        let kinds: Vec<FormatKind> = names
+            .map(|name| kind(*name, scene, arguments, grid, channels))
+            .collect();
         let of = Description {
             grid: *grid,
             units: scene.model().units.name().to_owned(),
@@ -69,14 +67,14 @@ impl Formats {
             let sure = if needs.disk_is_sure { 1 } else { BEST };
             least = least.saturating_add(needs.disk / sure);
         }
-        if single.is_none() {
+        if !is_single {
             let manifest = largest_manifest_bytes(grid, 0);
             all.disk = all.disk.saturating_add(manifest);
             least = least.saturating_add(if all.disk_is_sure { manifest } else { 0 });
         }
         Ok(Self {
             kinds,
-            is_single: single.is_some(),
+            is_single,
             needs: all,
             least,
         })
@@ -117,7 +115,7 @@ impl Formats {
 }
 
 /// The format of the one file that the output is, where it is one.
-fn single(arguments: &Voxelize) -> Result<Option<FormatName>, Failure> {
+pub(super) fn single(arguments: &Voxelize) -> Result<Option<FormatName>, Failure> {
     let Some(name) = FormatKind::single_name(&arguments.output) else {
         return Ok(None);
     };

@@ -2,7 +2,7 @@
 
 use super::arguments::{Common, Voxelize};
 use super::failure::Failure;
-use super::formats::Formats;
+use super::formats::{self, Formats};
 use super::interrupt;
 use super::memory::{self, Budget, Need};
 use super::output::{self, Console, NOTHING_LEFT, VOLUME_NOT_MEASURED};
@@ -203,6 +203,7 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         Ok(chosen)
     }
     let channels = channels(scene, &arguments.channels)?;
+    let single = formats::single(arguments)?;
     let (grid, output) = scene.model_mut();
     arguments.step.apply(grid)?;
     if !channels.is_empty() {
@@ -215,7 +216,9 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         FormatName::name,
         FormatName::from_name,
     )?;
-    if !formats.is_empty() {
+    if let Some(format) = single {
+        output.formats = vec![format];
+    } else if !formats.is_empty() {
         output.formats = formats;
     }
     let compression: Vec<String> = arguments.compression.iter().cloned().collect();

@@ -217,7 +217,7 @@ fn header(of: &Description, channel: &ChannelSpec, encoding: &str) -> String {
          encoding: {encoding}\n\
          space units: \"{units}\" \"{units}\" \"{units}\"\n\
          space origin: ({x},{y},{z})\n\
-         units:={units}\n\
+         length_unit:={units}\n\
          sign_convention:={}\n\
          \n",
         concat!("voxlathe ", env!("CARGO_PKG_VERSION")),
