@@ -18,7 +18,7 @@ use crate::sample::{
     Certainty, FRACTION_ERROR, LayerBuffers, LayerSampler, Loose, Selection, Tally, Ways,
 };
 use crate::scene::{ChannelModel, CompressionName, FormatName, PARAMETERS, Scene, nearest};
-use crate::solid::{Operation, Part, Scalar};
+use crate::solid::{Assembly, Operation, Part, Scalar};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -31,6 +31,8 @@ struct Plan {
     selection: Selection,
     kernel: Kernel,
     scalars: Vec<Scalar>,
+    /// Materials whose shares are channels.
+    materials: Vec<u32>,
     channels: Vec<ChannelSpec>,
     formats: Formats,
     budget: Budget,
@@ -72,10 +74,18 @@ pub(super) fn run(
     let interrupted = || interrupt::check().is_err();
     let grid = plan.grid;
     let what = "the process with the tables of its solids";
+    let materials = materials(&scene, &plan)?;
+    let profiles = if plan.selection.has(Channel::ProfileParameter) {
+        scene.profile_curves()
+    } else {
+        Vec::new()
+    };
     let tables = || LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection);
     let sampler = (plan.budget)
         .while_watched(what, LESS, console, tables)
         .with_scalars(plan.scalars.clone())
+        .with_profiles(profiles)
+        .with_materials(&materials)
         .with_cancel(&interrupted);
     interrupt::check()?;
     // The tables are there: what is missing is known.
@@ -124,6 +134,7 @@ pub(super) fn run(
         "voxels whose fractions were integrated"
     );
     within_error(&tally, plan.selection.fraction_error)?;
+    all_seen(&tally)?;
     if let Some(warning) = said_of_fractions(&tally) {
         console.warn(&warning);
     }
@@ -282,6 +293,12 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         .collect();
     let wanted: Vec<Channel> = output.channels.iter().filter_map(channel).collect();
     let scalars: Vec<Scalar> = output.channels.iter().filter_map(scalar).collect();
+    let materials: Vec<u32> = (output.channels.iter())
+        .filter_map(|channel| match channel {
+            ChannelModel::MaterialFraction { id, .. } => Some(*id),
+            _ => None,
+        })
+        .collect();
     let selection = Selection {
         fraction_error: fraction_error(arguments)?,
         ..Selection::of(&wanted, scene.band(&grid))
@@ -294,6 +311,12 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection).saturating_add(
             LayerSampler::bytes_of_division(scene.assembly(), &selection),
         );
+    // A material's share is sampled by itself, with all that it takes.
+    let shares = Selection::of(&[Channel::Fraction], None);
+    let of_material = LayerSampler::bytes_per_layer(scene.assembly(), &grid, &shares)
+        .saturating_add(4 * grid.layer_len() as u64)
+        .saturating_mul(materials.len() as u64);
+    let sampled = sampled.saturating_add(of_material);
     let layer_bytes = layer_bytes(&grid, sampled, scalars.len(), &formats);
     let stack_bytes = formats.needs.disk;
     let plan = Plan {
@@ -301,6 +324,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         selection,
         kernel,
         scalars,
+        materials,
         channels,
         budget: Budget::new(arguments.memory_limit),
         fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview)
@@ -360,7 +384,7 @@ fn layer_bytes(grid: &GridSpec, sampled: u64, scalars: usize, formats: &Formats)
 fn channel(model: &ChannelModel) -> Option<Channel> {
     match model {
         ChannelModel::Known(channel) => Some(*channel),
-        ChannelModel::Scalar(_) => None,
+        ChannelModel::MaterialFraction { .. } | ChannelModel::Scalar(_) => None,
     }
 }
 
@@ -370,12 +394,18 @@ fn layer<'a>(
     buffers: &'a LayerBuffers,
 ) -> Vec<(&'a str, Samples<'a>)> {
     let mut scalars = buffers.scalars.iter();
+    let mut materials = buffers.material_fractions.iter();
     let samples = |spec: &'a ChannelSpec| {
         let samples = match Channel::from_name(&spec.name) {
             Some(Channel::Occupancy) => Samples::Half(&buffers.occupancy),
             Some(Channel::Fraction) => Samples::Float(&buffers.fraction),
             Some(Channel::Sdf) => Samples::Float(&buffers.sdf),
             Some(Channel::Material) => Samples::Uint(&buffers.material),
+            Some(other) => {
+                let found = buffers.others.iter().find(|(channel, _)| *channel == other);
+                Samples::Float(&found?.1)
+            }
+            None if spec.name.starts_with("fraction-") => Samples::Float(materials.next()?),
             None => Samples::Float(scalars.next()?),
         };
         Some((spec.name.as_str(), samples))
@@ -607,6 +637,34 @@ fn within_error(tally: &Tally, asked: Option<f64>) -> Result<(), Failure> {
             )))
         }
         _ => Ok(()),
+    }
+}
+
+/// What is of each material whose share is a channel, in their order.
+fn materials(scene: &Scene, plan: &Plan) -> Result<Vec<Assembly>, Failure> {
+    let ids = plan.materials.iter();
+    ids.map(|id| {
+        let missing = || Failure::usage(format!("--channels: no solid has material {id}"));
+        scene.assembly().of_material(*id).ok_or_else(missing)
+    })
+    .collect()
+}
+
+/// Refuses what is asked of nearest points that are not known.
+fn all_seen(tally: &Tally) -> Result<(), Failure> {
+    if tally.uncut > 0 {
+        let voxels = tally.uncut;
+        return Err(Failure::usage(format!(
+            "--channels: {voxels} voxels are cut by a volume that is no turned solid, or by too many solids, whose cut cells \
+             are not known; leave out face, centroid and boundary"
+        )));
+    }
+    match tally.unseen {
+        0 => Ok(()),
+        voxels => Err(Failure::usage(format!(
+            "--channels: the boundary point nearest to {voxels} voxels is not known, as the solids are too many, of a volume that \
+             is no turned solid, or too far away; leave out normal, closest, curvature, azimuth and profile-parameter"
+        ))),
     }
 }
 

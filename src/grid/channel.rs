@@ -79,6 +79,8 @@ macro_rules! channels {
     };
 }
 
+/// From the middle of a voxel.
+const HALF: Option<RangeInclusive<f32>> = Some(-0.5..=0.5);
 /// Shares of a whole.
 const SHARE: Option<RangeInclusive<f32>> = Some(0.0..=1.0);
 
@@ -95,6 +97,75 @@ channels! {
     /// Material id at the voxel's centre, 0 outside.
     Material = "material", Id, Unit::Number, None, true,
         "id of the material at the voxel centre, 0 where empty";
+    /// Share of the voxel's lower side across x that is within the solid's interior.
+    FaceX = "face-x", Real, Unit::Number, SHARE, true,
+        "share of the voxel's lower side across x that is within the solid's interior";
+    /// Share of the voxel's lower side across y that is within the solid's interior.
+    FaceY = "face-y", Real, Unit::Number, SHARE, true,
+        "share of the voxel's lower side across y that is within the solid's interior";
+    /// Share of the voxel's lower side across z that is within the solid's interior.
+    FaceZ = "face-z", Real, Unit::Number, SHARE, true,
+        "share of the voxel's lower side across z that is within the solid's interior";
+    /// X of the centroid of the voxel's solid part, from its centre in spacings, 0 where there is none.
+    CentroidX = "centroid-x", Real, Unit::Number, HALF, true,
+        "x of the centroid of the voxel's solid part, from its centre in spacings, 0 where there is none";
+    /// Y of the centroid of the voxel's solid part, from its centre in spacings, 0 where there is none.
+    CentroidY = "centroid-y", Real, Unit::Number, HALF, true,
+        "y of the centroid of the voxel's solid part, from its centre in spacings, 0 where there is none";
+    /// Z of the centroid of the voxel's solid part, from its centre in spacings, 0 where there is none.
+    CentroidZ = "centroid-z", Real, Unit::Number, HALF, true,
+        "z of the centroid of the voxel's solid part, from its centre in spacings, 0 where there is none";
+    /// Area of the solid's boundary in the voxel.
+    BoundaryArea = "boundary-area", Real, Unit::Length(2), None, true,
+        "area of the solid's boundary in the voxel";
+    /// X of the centroid of the boundary in the voxel, from its centre in spacings, 0 where there is none.
+    BoundaryX = "boundary-x", Real, Unit::Number, HALF, true,
+        "x of the centroid of the boundary in the voxel, from its centre in spacings, 0 where there is none";
+    /// Y of the centroid of the boundary in the voxel, from its centre in spacings, 0 where there is none.
+    BoundaryY = "boundary-y", Real, Unit::Number, HALF, true,
+        "y of the centroid of the boundary in the voxel, from its centre in spacings, 0 where there is none";
+    /// Z of the centroid of the boundary in the voxel, from its centre in spacings, 0 where there is none.
+    BoundaryZ = "boundary-z", Real, Unit::Number, HALF, true,
+        "z of the centroid of the boundary in the voxel, from its centre in spacings, 0 where there is none";
+    /// Integral of x of the outward unit normal over the boundary in the voxel.
+    BoundaryNormalX = "boundary-normal-x", Real, Unit::Length(2), None, true,
+        "integral of x of the outward unit normal over the boundary in the voxel";
+    /// Integral of y of the outward unit normal over the boundary in the voxel.
+    BoundaryNormalY = "boundary-normal-y", Real, Unit::Length(2), None, true,
+        "integral of y of the outward unit normal over the boundary in the voxel";
+    /// Integral of z of the outward unit normal over the boundary in the voxel.
+    BoundaryNormalZ = "boundary-normal-z", Real, Unit::Length(2), None, true,
+        "integral of z of the outward unit normal over the boundary in the voxel";
+    /// X of the unit gradient of the distance at the nearest boundary point.
+    NormalX = "normal-x", Real, Unit::Number, Some(-1.0..=1.0), false,
+        "x of the unit gradient of the distance at the nearest boundary point";
+    /// Y of the unit gradient of the distance at the nearest boundary point.
+    NormalY = "normal-y", Real, Unit::Number, Some(-1.0..=1.0), false,
+        "y of the unit gradient of the distance at the nearest boundary point";
+    /// Z of the unit gradient of the distance at the nearest boundary point.
+    NormalZ = "normal-z", Real, Unit::Number, Some(-1.0..=1.0), false,
+        "z of the unit gradient of the distance at the nearest boundary point";
+    /// X of the boundary point nearest to the voxel centre.
+    ClosestX = "closest-x", Real, Unit::Length(1), None, false,
+        "x of the boundary point nearest to the voxel centre";
+    /// Y of the boundary point nearest to the voxel centre.
+    ClosestY = "closest-y", Real, Unit::Length(1), None, false,
+        "y of the boundary point nearest to the voxel centre";
+    /// Z of the boundary point nearest to the voxel centre.
+    ClosestZ = "closest-z", Real, Unit::Length(1), None, false,
+        "z of the boundary point nearest to the voxel centre";
+    /// Mean curvature of the boundary at its nearest point, 1/R on a ball of radius R, 0 on edges.
+    CurvatureMean = "curvature-mean", Real, Unit::Length(-1), None, false,
+        "mean curvature of the boundary at its nearest point, 1/R on a ball of radius R, 0 on edges";
+    /// Gaussian curvature of the boundary at its nearest point, 0 on edges.
+    CurvatureGauss = "curvature-gauss", Real, Unit::Length(-2), None, false,
+        "Gaussian curvature of the boundary at its nearest point, 0 on edges";
+    /// Angle of the nearest boundary point about the axis of its solid, counter-clockwise from the axis' x, 0 on the axis.
+    Azimuth = "azimuth", Real, Unit::Degrees, Some(0.0..=360.0), false,
+        "angle of the nearest boundary point about the axis of its solid, counter-clockwise from the axis' x, 0 on the axis";
+    /// Number of the profile's curve at the nearest boundary point and the share of its parameter, -1 on what is no such curve.
+    ProfileParameter = "profile-parameter", Real, Unit::Number, None, false,
+        "number of the profile's curve at the nearest boundary point and the share of its parameter, -1 on what is no such curve";
 }
 
 impl Channel {
@@ -163,13 +234,13 @@ impl Channels {
 
     /// The same with `channel`.
     #[must_use]
-    pub fn with(self, channel: Channel) -> Self {
+    pub const fn with(self, channel: Channel) -> Self {
         Self(self.0 | (1 << channel as u32))
     }
 
     /// Those that are of both.
     #[must_use]
-    pub fn and(self, other: Self) -> Self {
+    pub const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
@@ -183,6 +254,37 @@ impl Channels {
     pub fn iter(self) -> impl Iterator<Item = Channel> {
         Channel::ALL.iter().copied().filter(move |c| self.has(*c))
     }
+}
+
+impl Channels {
+    /// What is asked of the voxels that the boundary cuts.
+    pub const OF_CUT_CELLS: Self = Self::NONE
+        .with(Channel::FaceX)
+        .with(Channel::FaceY)
+        .with(Channel::FaceZ)
+        .with(Channel::CentroidX)
+        .with(Channel::CentroidY)
+        .with(Channel::CentroidZ)
+        .with(Channel::BoundaryArea)
+        .with(Channel::BoundaryX)
+        .with(Channel::BoundaryY)
+        .with(Channel::BoundaryZ)
+        .with(Channel::BoundaryNormalX)
+        .with(Channel::BoundaryNormalY)
+        .with(Channel::BoundaryNormalZ);
+
+    /// What is asked of the boundary's point that is nearest to a voxel's centre.
+    pub const OF_NEAREST_POINT: Self = Self::NONE
+        .with(Channel::NormalX)
+        .with(Channel::NormalY)
+        .with(Channel::NormalZ)
+        .with(Channel::ClosestX)
+        .with(Channel::ClosestY)
+        .with(Channel::ClosestZ)
+        .with(Channel::CurvatureMean)
+        .with(Channel::CurvatureGauss)
+        .with(Channel::Azimuth)
+        .with(Channel::ProfileParameter);
 }
 
 impl FromIterator<Channel> for Channels {

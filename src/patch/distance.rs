@@ -31,7 +31,7 @@
 //! * Source: Johnson, Cohen, *Minimum distance queries*, ACM CAD 1998 (the tree); MATH of this crate,
 //!   closest points to a rational span (the bound).
 
-use super::face_net::{Net, Scalars, cartesian, dot, length, minus, real, squares};
+use super::face_net::{Net, Scalars, cartesian, cross, dot, length, minus, real, squares};
 use super::face_tree::{PatchTree, SubPatch};
 use smallvec::SmallVec;
 
@@ -53,6 +53,9 @@ pub(super) struct Found {
     pub(super) foot: [f64; 3],
     pub(super) face: u32,
     pub(super) parameters: [f64; 2],
+    /// The part of the tree, and the place in it.
+    part: usize,
+    at: [f64; 2],
     /// No point is nearer than the distance less this.
     pub(super) gap: f64,
 }
@@ -108,7 +111,62 @@ pub(super) fn search(tree: &PatchTree, q: [f64; 3], limit: f64) -> Option<Found>
         foot: std::array::from_fn(|c| x[c] + part.origin[c]),
         face: part.face,
         parameters: [0, 1].map(|k| part.low[k] + part.sides[k] * at[k]),
+        part: index,
+        at,
         gap: search.resolution * (1.0 + search.best),
+    })
+}
+
+/// What a surface is like at its nearest point: a normal and the curvatures, positive where the surface bends away from it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Touch {
+    /// In local coordinates.
+    pub(super) at: [f64; 3],
+    /// Not of unit length; 0 where the surface has none.
+    pub(super) normal: [f64; 3],
+    pub(super) mean: f64,
+    pub(super) gauss: f64,
+}
+
+/// The nearest point to `q` with the surface's normal and curvatures there.
+///
+/// A minimum of the distance tells its place to the square root of rounding only: Newton's method for the zero of the
+/// slope goes on from there.
+pub(super) fn touch(tree: &PatchTree, q: [f64; 3], limit: f64) -> Option<Touch> {
+    const STEPS: usize = 3;
+    let found = search(tree, q, limit)?;
+    let part = &tree.parts[found.part];
+    let net = part.net.seen_from(minus(q, part.origin));
+    let mut at = found.at;
+    for _ in 0..STEPS {
+        let step = newton_step(&model(&net, at));
+        at = [0, 1].map(|k| (at[k] + step[k]).clamp(0.0, 1.0));
+    }
+    let jet = part.net.jet(at[0], at[1]);
+    let w = jet.value[3];
+    let x = cartesian(jet.value);
+    let first = |d: [f64; 4]| -> [f64; 3] { std::array::from_fn(|c| (d[c] - x[c] * d[3]) / w) };
+    let (xu, xv) = (first(jet.u), first(jet.v));
+    let second = |d: [f64; 4], a: [f64; 4], b: [f64; 4], xa: [f64; 3], xb: [f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|c| (d[c] - a[3] * xb[c] - b[3] * xa[c] - d[3] * x[c]) / w)
+    };
+    let normal = cross(xu, xv);
+    let size = length(normal);
+    // The coefficients of the two fundamental forms.
+    let [e, f, g] = [dot(xu, xu), dot(xu, xv), dot(xv, xv)];
+    let [l, m, n] = [
+        second(jet.uu, jet.u, jet.u, xu, xu),
+        second(jet.uv, jet.u, jet.v, xu, xv),
+        second(jet.vv, jet.v, jet.v, xv, xv),
+    ]
+    .map(|bend| dot(bend, normal) / size);
+    let square = e * g - f * f;
+    let finite = |v: f64| if v.is_finite() { v } else { 0.0 };
+    Some(Touch {
+        at: std::array::from_fn(|c| x[c] + part.origin[c]),
+        normal,
+        mean: finite((2.0 * f * m - e * n - g * l) / (2.0 * square)),
+        gauss: finite((l * n - m * m) / square),
     })
 }
 

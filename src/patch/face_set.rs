@@ -47,6 +47,19 @@ pub struct NearestFace {
     pub gap: f64,
 }
 
+/// What an outer face is like at the point nearest to another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FaceTouch {
+    /// The nearest point, in model units.
+    pub(crate) at: DVec3,
+    /// A normal, not of unit length; 0 where there is none.
+    pub(crate) normal: DVec3,
+    /// Mean curvature per model unit, positive where the face bends away from the normal.
+    pub(crate) mean: f64,
+    /// Gaussian curvature per square of a model unit.
+    pub(crate) gauss: f64,
+}
+
 /// A nearly flat part of an outer face: control points (w x, w y, w z, w) times `unit`, from `origin`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FacePart<'a> {
@@ -100,6 +113,24 @@ impl FaceSet {
     #[must_use]
     pub fn nearest(&self, point: DVec3) -> Option<NearestFace> {
         self.find(point, f64::INFINITY)
+    }
+
+    /// The nearest point with the normal and the curvatures of its face; `None` where there are no faces, or `point` is too
+    /// far away to tell.
+    pub(crate) fn touch(&self, point: DVec3) -> Option<FaceTouch> {
+        let from = point - self.frame.centre;
+        if !(from.abs().max_element() / self.frame.unit <= FAR) {
+            return None;
+        }
+        let q = self.frame.local(point);
+        let found = distance::touch(&self.tree, q, length(q) + 4.0)?;
+        let unit = self.frame.unit;
+        Some(FaceTouch {
+            at: self.frame.model(found.at),
+            normal: DVec3::from_array(found.normal),
+            mean: found.mean / unit,
+            gauss: found.gauss / (unit * unit),
+        })
     }
 
     fn find(&self, point: DVec3, limit: f64) -> Option<NearestFace> {

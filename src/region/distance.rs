@@ -126,6 +126,34 @@ impl DistanceSet {
     }
 }
 
+/// The nearest point of the pieces, and what the curve is like there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Touch {
+    pub(crate) distance: f64,
+    pub(crate) at: [f64; 2],
+    /// Unit vector along the piece.
+    pub(crate) tangent: [f64; 2],
+    /// Of the piece, per unit of length; positive where it turns to the left of the tangent.
+    pub(crate) curvature: f64,
+}
+
+impl DistanceSet {
+    /// As [`nearest`](Self::nearest), with the curve's tangent and curvature.
+    pub(crate) fn touch(&self, point: [f64; 2]) -> Option<Touch> {
+        let mut best = f64::INFINITY;
+        let mut found = None;
+        self.tree.visit_nearest(point, best, |i, limit| {
+            let square = self.arcs[i as usize].distance_squared(point, limit);
+            if square < best {
+                best = square;
+                found = Some(i as usize);
+            }
+            best
+        });
+        found.map(|i| self.arcs[i].touch(point, best.sqrt()))
+    }
+}
+
 /// A point of a piece than which no point near it along the piece is nearer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LocalFoot {
@@ -341,6 +369,79 @@ impl Arc {
     }
 }
 
+impl Arc {
+    /// What the piece is like at its nearest point.
+    fn touch(&self, point: [f64; 2], distance: f64) -> Touch {
+        let at = self.foot(point);
+        let [x, y] = [at[0] - self.origin[0], at[1] - self.origin[1]];
+        let (tangent, curvature) = match &self.shape {
+            Shape::Segment { direction, .. } => (*direction, 0.0),
+            Shape::Circle { centre, radius } => {
+                let [s, e] = self.ends.map(|p| [p[0] - centre[0], p[1] - centre[1]]);
+                let turn = cross(s, e).signum();
+                let v = [x - centre[0], y - centre[1]];
+                ([-v[1] * turn, v[0] * turn], turn / radius)
+            }
+            Shape::Rational(rational) => {
+                let t = self.parameter(point);
+                (rational.slope(t), rational.curvature(t))
+            }
+        };
+        let length = tangent[0].hypot(tangent[1]);
+        let is_smooth = length > 0.0 && curvature.is_finite();
+        Touch {
+            distance,
+            at,
+            tangent: if length > 0.0 {
+                tangent.map(|t| t / length)
+            } else {
+                [0.0, 1.0]
+            },
+            curvature: if is_smooth { curvature } else { 0.0 },
+        }
+    }
+
+    /// The parameter of a rational piece's nearest point.
+    fn parameter(&self, point: [f64; 2]) -> f64 {
+        let q = [point[0] - self.origin[0], point[1] - self.origin[1]];
+        let [a, b] = self.ends.map(|e| square(q, e));
+        let end = if b < a { 1.0 } else { 0.0 };
+        let Shape::Rational(rational) = &self.shape else {
+            return end;
+        };
+        let mut best = Best::below(a.min(b));
+        rational.minimise(q, &mut best);
+        best.parameter.unwrap_or(end)
+    }
+}
+
+/// One curve that is asked for the parameter of its nearest point.
+#[derive(Debug)]
+pub(super) struct Locating(Arc);
+
+impl Locating {
+    pub(super) fn new(piece: &Piece) -> Self {
+        Self(Arc::new(piece))
+    }
+
+    /// The squared distance, or the limit where that is less, and the parameter of the nearest point.
+    pub(super) fn nearest(&self, point: [f64; 2], limit: f64) -> (f64, f64) {
+        let arc = &self.0;
+        let square = arc.distance_squared(point, limit);
+        let parameter = match &arc.shape {
+            Shape::Segment {
+                direction: d,
+                length_squared,
+            } => {
+                let q = [0, 1].map(|c| point[c] - arc.origin[c] - arc.ends[0][c]);
+                ((q[0] * d[0] + q[1] * d[1]) / length_squared).clamp(0.0, 1.0)
+            }
+            _ => arc.parameter(point),
+        };
+        (square, parameter)
+    }
+}
+
 fn square(p: [f64; 2], q: [f64; 2]) -> f64 {
     let (x, y) = (p[0] - q[0], p[1] - q[1]);
     x * x + y * y
@@ -422,6 +523,31 @@ impl Rational {
             let (v, dv) = bernstein::evaluate_with_derivative(&self.coefficients[c], t);
             (dv * w - v * dw) / (w * w)
         })
+    }
+
+    /// Curvature of the curve, positive where it turns left: `(r' z" - z' r") / |C'|³`, where of the numerators A and the
+    /// weight W `C' = (A' - C W') / W` and `C" = (A" - 2 C' W' - C W") / W` (Piegl & Tiller, *The NURBS Book*, §4.3).
+    fn curvature(&self, t: f64) -> f64 {
+        let jet = |c: usize| {
+            let coefficients = &self.coefficients[c];
+            let first = bernstein::derivative(coefficients);
+            let second = if first.len() > 1 {
+                bernstein::evaluate(&bernstein::derivative(&first), t)
+            } else {
+                0.0
+            };
+            let value = bernstein::evaluate(coefficients, t);
+            [value, bernstein::evaluate(&first, t), second]
+        };
+        let [r, z, w] = [jet(0), jet(1), jet(2)];
+        let of = |a: [f64; 3]| {
+            let value = a[0] / w[0];
+            let first = (a[1] - value * w[1]) / w[0];
+            let second = (a[2] - 2.0 * first * w[1] - value * w[2]) / w[0];
+            [first, second]
+        };
+        let ([dr, ddr], [dz, ddz]) = (of(r), of(z));
+        (dr * ddz - dz * ddr) / dr.hypot(dz).powi(3)
     }
 
     /// Half the derivative of the squared distance, times W³.

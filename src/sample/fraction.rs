@@ -17,7 +17,7 @@ use glam::DVec3;
 /// A larger error of the flux gains nothing, and would be seen in the sum.
 const FOR_SUMS: f64 = 1e-9;
 /// Share of the error asked for that an estimate is to be below.
-const ESTIMATED: f64 = 0.25;
+pub(super) const ESTIMATED: f64 = 0.25;
 /// Estimates of sections that are asked for less than this take long and gain nothing.
 const LEAST: f64 = 1e-10;
 

@@ -9,6 +9,7 @@ use super::radial::{LayerOut, Writing};
 use super::tally::{Certainty, FRACTION_ERROR, Tally};
 use crate::grid::{Channel, Channels, GridSpec};
 use crate::math::Kernel;
+use crate::region::CurveLocator;
 use crate::solid::{Assembly, Body, Part, Scalar};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -38,6 +39,24 @@ impl Selection {
         }
     }
 
+    /// Whether distances are sampled, if only to tell which voxels the boundary cuts.
+    fn needs_distances(&self) -> bool {
+        self.has(Channel::Sdf) || !self.channels.and(Channels::OF_CUT_CELLS).is_empty()
+    }
+
+    /// The quantities wanted that have no place of their own in [`LayerBuffers`].
+    fn others(&self) -> impl Iterator<Item = Channel> + Clone {
+        const OWN: [Channel; 4] = [
+            Channel::Occupancy,
+            Channel::Fraction,
+            Channel::Sdf,
+            Channel::Material,
+        ];
+        let all = Channel::ALL.iter().copied();
+        let channels = self.channels;
+        all.filter(move |c| channels.has(*c) && !OWN.contains(c))
+    }
+
     /// Whether a channel is wanted.
     #[must_use]
     pub fn has(&self, channel: Channel) -> bool {
@@ -56,6 +75,10 @@ pub struct LayerBuffers {
     pub sdf: Vec<f32>,
     /// Material id.
     pub material: Vec<u32>,
+    /// The other quantities that are wanted, each a value for a voxel.
+    pub others: Vec<(Channel, Vec<f32>)>,
+    /// The shares of materials that the sampler was given.
+    pub material_fractions: Vec<Vec<f32>>,
     /// Scalars of volumes, one list for each that the sampler was given.
     pub scalars: Vec<Vec<f32>>,
     /// Voxels whose centre is inside.
@@ -65,6 +88,7 @@ pub struct LayerBuffers {
     /// What was counted on the way.
     pub tally: Tally,
     pub(super) scratch: LayerScratch,
+    of_material: Option<Box<LayerBuffers>>,
 }
 
 /// Asked between rows whether to stop.
@@ -82,6 +106,10 @@ pub struct LayerSampler<'a> {
     /// Surface and material of the added parts, the last first; empty where there is one material.
     pub(super) layered: Vec<(usize, u32)>,
     pub(super) scalars: Vec<Scalar>,
+    /// What is of each material by itself.
+    materials: Vec<LayerSampler<'a>>,
+    /// For each part the curves of its profile, where it has one.
+    pub(super) profiles: Vec<Option<Arc<CurveLocator>>>,
     kernel: Kernel,
     /// The bodies of the assembly.
     bodies: Vec<BodySampler>,
@@ -147,7 +175,7 @@ impl<'a> LayerSampler<'a> {
         selection: Selection,
     ) -> Self {
         Self::with_bodies(kernel, assembly, grid, selection, |body| {
-            BodySampler::new(kernel, body, grid, selection.has(Channel::Sdf))
+            BodySampler::new(kernel, body, grid, selection.needs_distances())
         })
     }
 
@@ -192,6 +220,8 @@ impl<'a> LayerSampler<'a> {
             surfaces,
             layered,
             scalars: Vec::new(),
+            materials: Vec::new(),
+            profiles: Vec::new(),
             kernel,
             bodies: bodies.collect(),
             single: assembly.single_index(),
@@ -202,6 +232,28 @@ impl<'a> LayerSampler<'a> {
     #[must_use]
     pub fn with_scalars(self, scalars: Vec<Scalar>) -> Self {
         Self { scalars, ..self }
+    }
+
+    /// A sampler that numbers curves by those of each part's profile.
+    #[must_use]
+    pub(crate) fn with_profiles(self, profiles: Vec<Option<Arc<CurveLocator>>>) -> Self {
+        Self { profiles, ..self }
+    }
+
+    /// A sampler that fills [`LayerBuffers::material_fractions`] with the shares of these, each an assembly of what is of
+    /// one material.
+    #[must_use]
+    pub fn with_materials(self, materials: &'a [Assembly]) -> Self {
+        let selection = Selection {
+            channels: Channels::NONE.with(Channel::Fraction),
+            ..self.selection
+        };
+        let one = |assembly| Self {
+            cancel: self.cancel,
+            ..Self::with_kernel(self.kernel, assembly, self.grid, selection)
+        };
+        let materials = materials.iter().map(one).collect();
+        Self { materials, ..self }
     }
 
     /// A sampler that leaves a layer unfinished once `cancel` says so.
@@ -223,12 +275,14 @@ impl<'a> LayerSampler<'a> {
             Some(_) => 0,
             None => assembly.bodies().len() as u64,
         };
+        let has = |channel: Channel| selection.has(channel);
         (voxels / 8).saturating_mul(1 + 2 * bodies)
-            + voxels.saturating_mul(each(selection.has(Channel::Fraction), 8 * bodies))
+            + voxels.saturating_mul(each(has(Channel::Fraction), 8 * bodies))
             + voxels
-                * (1 + each(selection.has(Channel::Fraction), 4)
-                    + each(selection.has(Channel::Sdf), 4)
-                    + each(selection.has(Channel::Material), 4))
+                * (1 + each(has(Channel::Fraction), 4)
+                    + each(selection.needs_distances(), 4)
+                    + each(has(Channel::Material), 4)
+                    + 4 * selection.others().count() as u64)
     }
 
     /// Bytes that dividing a voxel takes, where several bodies may touch it and fractions are wanted: as many parts as
@@ -261,9 +315,18 @@ impl<'a> LayerSampler<'a> {
         out.fraction
             .resize(wanted(self.selection.has(Channel::Fraction)), 0.0);
         out.sdf
-            .resize(wanted(self.selection.has(Channel::Sdf)), 0.0);
+            .resize(wanted(self.selection.needs_distances()), 0.0);
         out.material
             .resize(wanted(self.selection.has(Channel::Material)), 0);
+        let others = self.selection.others();
+        if !out.others.iter().map(|o| o.0).eq(others.clone()) {
+            out.others = others.map(|channel| (channel, Vec::new())).collect();
+        }
+        for (_, values) in &mut out.others {
+            // Not every voxel has all of them.
+            values.clear();
+            values.resize(n, 0.0);
+        }
         out.scalars.resize(self.scalars.len(), Vec::new());
         for values in &mut out.scalars {
             // But for those of voxels outside.
@@ -278,17 +341,29 @@ impl<'a> LayerSampler<'a> {
         self.find_sides(k, scratch);
         out.inside = bits::count(&scratch.inside);
         bits::expand(self.kernel, &scratch.inside, &mut out.occupancy);
-        let measured = self.selection.has(Channel::Sdf) && self.fills_distance();
+        let distances = self.selection.needs_distances();
+        let measured = distances && self.fills_distance();
         if measured {
             self.find_distances(k, scratch, &mut out.sdf, None);
             self.count_certainty(k, scratch, &out.sdf, &mut out.tally.certainty);
         }
         let fractions = self.find_fractions(k, out);
-        self.rows(
-            k,
-            [self.selection.has(Channel::Sdf) && !measured, fractions],
-            out,
-        );
+        self.rows(k, [distances && !measured, fractions], out);
+        self.cut_cells(k, out);
+        self.nearest_points(k, out);
+        self.material_fractions(k, out);
+    }
+
+    /// Samples the share of each material that is wanted.
+    fn material_fractions(&self, k: usize, out: &mut LayerBuffers) {
+        out.material_fractions
+            .resize(self.materials.len(), Vec::new());
+        for (sampler, values) in self.materials.iter().zip(&mut out.material_fractions) {
+            let one = out.of_material.get_or_insert_default();
+            sampler.sample(k, one);
+            values.clone_from(&one.fraction);
+            out.tally.loose.add(&one.tally.loose);
+        }
     }
 
     /// Finds the fractions of layer `k`, or those of each body; whether rows are still to be filled.

@@ -13,6 +13,10 @@ pub struct Tally {
     pub loose: Loose,
     /// How the fractions of voxels were found that a surface may pass through.
     pub ways: Ways,
+    /// Voxels whose nearest boundary point is not known.
+    pub unseen: u64,
+    /// Voxels whose boundary rows cannot be cut by.
+    pub uncut: u64,
 }
 
 /// How the fractions of voxels were found that a surface may pass through.
@@ -41,6 +45,12 @@ pub struct Loose {
 }
 
 impl Loose {
+    /// Adds another count.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.voxels += other.voxels;
+        self.bound = self.bound.max(other.bound);
+    }
+
     /// Counts fractions of one bound, of which `error` is asked.
     pub(super) fn count(&mut self, voxels: u64, bound: f64, error: f64) {
         // A bound that just meets it is a sum of many.
@@ -72,8 +82,9 @@ impl Tally {
         a.lower_bound += b.lower_bound;
         a.exact_near += b.exact_near;
         a.lower_bound_near += b.lower_bound_near;
-        self.loose.voxels += other.loose.voxels;
-        self.loose.bound = self.loose.bound.max(other.loose.bound);
+        self.loose.add(&other.loose);
+        self.unseen += other.unseen;
+        self.uncut += other.uncut;
         self.ways.flux += other.ways.flux;
         self.ways.sections += other.ways.sections;
         self.ways.crossed += other.ways.crossed;

@@ -12,7 +12,8 @@ use crate::math::quadrature::Integral;
 use crate::math::{Aabb, Similarity};
 use crate::nurbs::NurbsVolume;
 use crate::region::{
-    Across, Boundary, Ends, Fill, ProfileCurve, ProfileLoop, Region, RegionError, Rules,
+    Across, Boundary, CurveLocator, Ends, Fill, ProfileCurve, ProfileLoop, Region, RegionError,
+    Rules,
 };
 use crate::solid::{
     Analytic, Assembly, Block, Body, Ellipsoid, Measures, Operation, Part, Shape, Turn,
@@ -167,6 +168,25 @@ impl Scene {
             model,
             warnings,
         })
+    }
+
+    /// The curves of each part's profile, in the order in which the scene numbers them; `None` of a part that has none.
+    pub(crate) fn profile_curves(&self) -> Vec<Option<Arc<CurveLocator>>> {
+        let mut made: BTreeMap<usize, Arc<CurveLocator>> = BTreeMap::new();
+        let solids = self.model.solids.iter();
+        solids
+            .map(|solid| match &solid.kind {
+                SolidKind::Revolve { profile, .. } => {
+                    let locator = made.entry(*profile).or_insert_with(|| {
+                        let all = loops(&self.model.profiles[*profile].1).concat();
+                        let curves: Vec<ProfileCurve> = all.iter().map(curve).collect();
+                        Arc::new(CurveLocator::new(&curves))
+                    });
+                    Some(Arc::clone(locator))
+                }
+                _ => None,
+            })
+            .collect()
     }
 
     /// The scene's data.

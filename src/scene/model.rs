@@ -63,6 +63,13 @@ named! {
 pub enum ChannelModel {
     /// What every scene has.
     Known(Channel),
+    /// The share of each voxel that is of a material.
+    MaterialFraction {
+        /// The material's id.
+        id: u32,
+        /// `fraction-ID`.
+        name: String,
+    },
     /// A parameter or a field of the volumes, by name.
     Scalar(String),
 }
@@ -73,7 +80,7 @@ impl ChannelModel {
     pub fn name(&self) -> &str {
         match self {
             Self::Known(known) => known.name(),
-            Self::Scalar(name) => name,
+            Self::MaterialFraction { name, .. } | Self::Scalar(name) => name,
         }
     }
 }
@@ -227,28 +234,46 @@ impl SceneModel {
         names
     }
 
+    /// The shares of the materials that the added solids have.
+    fn material_fractions(&self) -> Vec<ChannelModel> {
+        let added = self.solids.iter().enumerate();
+        let added = added.filter(|(n, s)| *n == 0 || s.operation == Operation::Add);
+        let ids: std::collections::BTreeSet<u32> = added.map(|(_, s)| s.material).collect();
+        let one = |id: u32| ChannelModel::MaterialFraction {
+            id,
+            name: format!("fraction-{id}"),
+        };
+        ids.into_iter().map(one).collect()
+    }
+
     /// The channels of those names.
     ///
     /// # Errors
     /// The index of the first name that the scene has no channel of, or that is there twice.
     pub fn channels(&self, names: &[&str]) -> Result<Vec<ChannelModel>, (usize, ChannelProblem)> {
         let scalars = self.scalar_names();
+        let materials = self.material_fractions();
         let mut found: Vec<ChannelModel> = Vec::new();
         for (index, &name) in names.iter().enumerate() {
-            let channel = match Channel::from_name(name) {
-                Some(known) => ChannelModel::Known(known),
-                None if scalars.contains(&name) => ChannelModel::Scalar(name.to_owned()),
-                None => {
-                    let known = Channel::ALL.iter().map(|c| c.name());
-                    let all: Vec<&str> = known.chain(scalars.iter().copied()).collect();
-                    return Err((
-                        index,
-                        ChannelProblem {
-                            wanted: format!("one of {}", all.join(", ")),
-                            hint: nearest(name, all.iter().copied()).map(str::to_owned),
-                        },
-                    ));
-                }
+            let known = Channel::from_name(name).map(ChannelModel::Known);
+            let of_material = || materials.iter().find(|m| m.name() == name).cloned();
+            let scalar = || {
+                let is_one = scalars.contains(&name);
+                is_one.then(|| ChannelModel::Scalar(name.to_owned()))
+            };
+            let Some(channel) = known.or_else(of_material).or_else(scalar) else {
+                let known = Channel::ALL.iter().map(|c| c.name());
+                let of_materials = materials.iter().map(ChannelModel::name);
+                let all: Vec<&str> = (known.chain(of_materials))
+                    .chain(scalars.iter().copied())
+                    .collect();
+                return Err((
+                    index,
+                    ChannelProblem {
+                        wanted: format!("one of {}", all.join(", ")),
+                        hint: nearest(name, all.iter().copied()).map(str::to_owned),
+                    },
+                ));
             };
             if found.contains(&channel) {
                 let problem = ChannelProblem {

@@ -15,6 +15,7 @@ use super::body::Body;
 use super::nearest::Nearest;
 use super::part::{Operation, Part};
 use super::patches::Patches;
+use super::surface_point::SurfacePoint;
 use super::terms::{Factor, Term, terms};
 use crate::math::Aabb;
 use crate::math::Side;
@@ -325,6 +326,16 @@ impl Assembly {
     pub(crate) fn nearest_distance(&self, point: DVec3, least: f64) -> (f64, bool) {
         let found = self.nearest().and_then(|n| n.distance(point, least));
         found.map_or((least, false), |distance| (distance, true))
+    }
+
+    /// The point of the composite's boundary that is nearest to a point, which is `inside` or not, with the outward normal
+    /// and the curvature there; `None` where it is not known.
+    pub(crate) fn surface_point(&self, point: DVec3, inside: bool) -> Option<SurfacePoint> {
+        let found = match self.single() {
+            Some(body) => body.surface_point(point, inside),
+            None => self.nearest()?.surface_point(point),
+        };
+        Some(found?.seen(point, inside, self.bounds.longest_side()))
     }
 
     /// The composite's boundary, where it is of several bodies and can be made of them.

@@ -30,6 +30,7 @@ mod remains;
 mod revolved;
 mod row;
 mod rule;
+mod surface_point;
 mod swept;
 mod terms;
 mod turn;
@@ -48,8 +49,9 @@ pub use turn::Turn;
 
 pub(crate) use assembly::{Measured, Reaches, signed};
 pub(crate) use body::{STRETCHES, VoxelShape};
-pub(crate) use crossed::Crossed;
+pub(crate) use crossed::{Crossed, CutCell};
 pub(crate) use fraction::{SNAP, TOLERANCE};
 pub(crate) use nearest::{Nearest, Vicinity};
 pub(crate) use row::{Cuts, LayerCuts, Ring, Row};
+pub(crate) use surface_point::SurfacePoint;
 pub(crate) use terms::{Factor, Term};

@@ -2,10 +2,11 @@
 
 use super::body::Body;
 use super::revolved::Revolved;
+use super::surface_point::SurfacePoint;
 use super::turn::Turn;
 use crate::math::{Aabb, Similarity};
 use crate::region::Region;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
 /// What a solid does with what the solids before it have made.
@@ -95,6 +96,35 @@ impl Part {
     /// The region that is turned, with what it became.
     pub(super) fn turned(&self) -> Option<(&Region, &Revolved)> {
         Some((self.region.as_deref()?, self.body.revolved()?))
+    }
+
+    /// Height and radius of a point about the part's axis, (r, z) in scene units before the part was placed; `None` of a
+    /// part that no region was turned to.
+    pub(crate) fn meridian_point(&self, point: DVec3) -> Option<[f64; 2]> {
+        let (region, body) = self.turned()?;
+        let local = body.frame().to_local(point).point * region.unit();
+        Some([local.x.hypot(local.y), local.z])
+    }
+
+    /// Whether a point of the part's surface is on a flat cap of a partial turn.
+    pub(crate) fn is_on_cap(&self, at: &SurfacePoint) -> bool {
+        /// How far, as a share of the distance from the axis, a point may be off the plane of a cap.
+        const TOUCH: f64 = 1e-9;
+        let Some(body) = self.body.revolved() else {
+            return false;
+        };
+        let Turn::Partial(wedge) = body.turn() else {
+            return false;
+        };
+        let frame = body.frame();
+        let p = frame.to_local(at.point).point;
+        let normal = frame.vector_to_local(at.normal);
+        let (flat, normal) = (DVec2::new(p.x, p.y), DVec2::new(normal.x, normal.y));
+        wedge.directions().iter().any(|d| {
+            let is_near = flat.dot(*d) >= 0.0 && flat.perp_dot(*d).abs() <= TOUCH * flat.length();
+            // On the edge of a cap the normal is across neither.
+            is_near && normal.perp_dot(*d).abs() > normal.dot(*d).abs()
+        })
     }
 
     /// The smallest box around the part, in scene units.

@@ -61,15 +61,20 @@ impl ChannelSpec {
     #[must_use]
     pub fn named(name: &str, kind: SampleKind, units: &str) -> Self {
         let known = Channel::from_name(name);
-        let meaning = match (known, name) {
-            (Some(channel), _) => channel.meaning(),
-            (None, "u" | "v" | "w") => "parameter of the volume at the voxel centre, 0 outside",
-            _ => "values at the voxel centre, 0 outside where they are fields of volumes",
+        let meaning = match (known, name, name.strip_prefix("fraction-")) {
+            (Some(channel), ..) => channel.meaning().to_owned(),
+            (None, "u" | "v" | "w", _) => {
+                "parameter of the volume at the voxel centre, 0 outside".to_owned()
+            }
+            (None, _, Some(id)) => format!("part of the voxel's volume that is material {id}"),
+            _ => {
+                "values at the voxel centre, 0 outside where they are fields of volumes".to_owned()
+            }
         };
         Self {
             name: name.into(),
             kind,
-            meaning: meaning.into(),
+            meaning,
             unit: known.and_then(|channel| channel.unit().label(units)),
         }
     }

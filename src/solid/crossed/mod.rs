@@ -23,6 +23,7 @@
 //!   between cuts, which are analytic there; square roots at cuts are
 //!   smoothed by a substitution. Where rows run out before the estimates are small the error says so.
 
+mod kit;
 mod panels;
 mod places;
 mod sheet;
@@ -35,6 +36,7 @@ use crate::math::Real;
 use crate::math::quadrature::Integral;
 use crate::region::Box2;
 use glam::DVec3;
+pub(crate) use kit::CutCell;
 use places::{Family, Places};
 use sheet::{Affine, Aligned, Bend, Event, Form, Line, Quadric, Sheet, Stretch, Surface};
 use smallvec::SmallVec;
@@ -102,6 +104,8 @@ pub(crate) struct Crossed<'a> {
     parts: Vec<Part<'a>>,
     solids: Vec<Whole<'a>>,
     terms: Vec<Masks>,
+    /// Side lengths in scene units.
+    cell: DVec3,
     /// Places of a row nearer to each other than this are one.
     tiny: f64,
     /// What places are rounded to.
@@ -110,12 +114,48 @@ pub(crate) struct Crossed<'a> {
 }
 
 /// A row through the voxel.
-struct Row {
-    /// How much of it is in the solid.
-    length: f64,
+struct Row<const N: usize> {
+    /// What is summed along it.
+    sums: [f64; N],
     events: SmallVec<[Event; 24]>,
     /// Labels of what ends the intervals.
     visible: SmallVec<[u32; 12]>,
+}
+
+/// What ends an interval of a row.
+#[derive(Debug, Clone, Copy)]
+enum End {
+    /// A side of the voxel, beyond which the solid goes on.
+    Side,
+    /// The surface that makes an event.
+    Surface(Event),
+}
+
+/// An interval of a row that is in the solid.
+#[derive(Debug, Clone, Copy)]
+struct Chord {
+    places: [f64; 2],
+    ends: [End; 2],
+}
+
+/// What is summed over the rows of a voxel.
+trait Sums<const N: usize> {
+    /// Whether surface in the voxel's sides matters.
+    const SIDES: bool;
+
+    /// What the intervals of one row add.
+    fn sum(voxel: &Crossed, line: Line, chords: &[Chord]) -> [f64; N];
+}
+
+/// How much of a row is in the solid.
+struct Length;
+
+impl Sums<1> for Length {
+    const SIDES: bool = false;
+
+    fn sum(_: &Crossed, _: Line, chords: &[Chord]) -> [f64; 1] {
+        [chords.iter().map(|c| c.places[1] - c.places[0]).sum()]
+    }
 }
 
 impl<'a> Crossed<'a> {
@@ -136,6 +176,7 @@ impl<'a> Crossed<'a> {
             parts: Vec::with_capacity(numbers.len()),
             solids: Vec::new(),
             terms: Vec::new(),
+            cell: sides,
             tiny: TINY,
             rounding: 16.0 * f64::EPSILON,
             rows: Cell::new(0),
@@ -374,7 +415,7 @@ impl<'a> Crossed<'a> {
     }
 
     /// What a line is in the voxel.
-    fn row(&self, line: Line) -> Row {
+    fn row<S: Sums<N>, const N: usize>(&self, line: Line) -> Row<N> {
         self.rows.set(self.rows.get() + 1);
         let mut events: SmallVec<[Event; 24]> = SmallVec::new();
         for part in &self.parts {
@@ -400,53 +441,92 @@ impl<'a> Crossed<'a> {
                 solids |= 1 << i;
             }
         }
-        let mut visible = SmallVec::new();
-        let mut length = 0.0;
-        let (mut from, mut inside) = (-0.5, false);
-        let mut started = false;
-        for event in &events {
-            let bit = 1 << event.solid;
-            if !started && event.place > -0.5 + self.tiny {
-                (started, inside) = (true, self.holds(solids));
-                if inside {
-                    visible.push(SIDE[0]);
-                }
-            }
-            if event.inside {
-                solids |= bit;
-            } else {
-                solids &= !bit;
-            }
-            if !started {
-                continue;
-            }
-            if event.place >= 0.5 - self.tiny {
-                break;
-            }
-            let now = self.holds(solids);
-            if now != inside {
-                visible.push(event.label);
-                if inside {
-                    length += event.place - from;
-                }
-                (from, inside) = (event.place, now);
-            }
-        }
-        if !started {
-            inside = self.holds(solids);
-            if inside {
-                visible.push(SIDE[0]);
-            }
-        }
-        if inside {
-            visible.push(SIDE[1]);
-            length += 0.5 - from;
-        }
+        let (chords, visible) = self.chords(&events, solids, S::SIDES);
         Row {
-            length,
+            sums: S::sum(self, line, &chords),
             events,
             visible,
         }
+    }
+
+    /// The intervals of a row that are in the solid, and the labels of what ends them; `solids` are those that the row is
+    /// in before its events.
+    ///
+    /// * `sides`: whether surface in a side of the voxel ends an interval as surface, where nothing of the solid is beyond.
+    fn chords(&self, events: &[Event], mut solids: u64, sides: bool) -> (Chords, Labels) {
+        let (low, high) = (-0.5 + self.tiny, 0.5 - self.tiny);
+        let mut chords = Chords::new();
+        let mut visible = Labels::new();
+        let mut rest = events.iter();
+        // Up to the side, and in it.
+        let beyond = |event: &Event| event.place < -0.5 - self.tiny;
+        let (mut side, mut outside) = (End::Side, None);
+        let started = events.iter().take_while(|e| e.place <= low).count();
+        for event in rest.by_ref().take(started) {
+            if sides && !beyond(event) {
+                let before = *outside.get_or_insert_with(|| !self.holds(solids));
+                solids = changed(solids, event);
+                if before && self.holds(solids) {
+                    side = End::Surface(*event);
+                }
+            } else {
+                solids = changed(solids, event);
+            }
+        }
+        let mut open = self.holds(solids).then_some((-0.5, side));
+        if let Some((_, side)) = open {
+            visible.push(label(side, 0));
+        }
+        let mut last = End::Side;
+        for event in rest {
+            let is_within = event.place < high;
+            if !(is_within || sides && open.is_some() && event.place <= 0.5 + self.tiny) {
+                break;
+            }
+            let before = self.holds(solids);
+            solids = changed(solids, event);
+            let now = self.holds(solids);
+            if now == before {
+                continue;
+            }
+            if !is_within {
+                last = if now { End::Side } else { End::Surface(*event) };
+                continue;
+            }
+            visible.push(event.label);
+            let end = End::Surface(*event);
+            open = match open {
+                Some((from, start)) => {
+                    chords.push(Chord {
+                        places: [from, event.place],
+                        ends: [start, end],
+                    });
+                    None
+                }
+                None => Some((event.place, end)),
+            };
+        }
+        if let Some((from, start)) = open {
+            visible.push(label(last, 1));
+            chords.push(Chord {
+                places: [from, 0.5],
+                ends: [start, last],
+            });
+        }
+        (chords, visible)
+    }
+
+    /// A unit normal of the surface that makes an event, at its place on a line.
+    fn normal(&self, event: &Event, line: Line, place: f64) -> DVec3 {
+        let mut number = (event.label / BRANCHES) as usize - 1;
+        for part in &self.parts {
+            if let Some(surface) = part.surfaces.get(number) {
+                let slope = surface.slope(&part.affine, line, place) / self.cell;
+                return slope.normalize_or_zero();
+            }
+            number -= part.surfaces.len();
+        }
+        DVec3::ZERO
     }
 
     /// Sorts by place; what is at one place by label.
@@ -566,7 +646,7 @@ impl<'a> Crossed<'a> {
         };
         for order in orders {
             self.rows.set(0);
-            let one = panels::volume(self, order, tolerance);
+            let [one] = panels::integrals::<Length, 1>(self, order, tolerance);
             for other in &found {
                 let error = (one.value - other.value).abs() + one.error.min(other.error);
                 if error < best.error {
@@ -589,6 +669,26 @@ impl<'a> Crossed<'a> {
             value,
             error: best.error + 2.0 * self.rounding,
         }
+    }
+}
+
+type Chords = SmallVec<[Chord; 6]>;
+type Labels = SmallVec<[u32; 12]>;
+
+/// The solids that a row is in behind an event.
+fn changed(solids: u64, event: &Event) -> u64 {
+    let bit = 1 << event.solid;
+    if event.inside {
+        solids | bit
+    } else {
+        solids & !bit
+    }
+}
+
+fn label(end: End, side: usize) -> u32 {
+    match end {
+        End::Side => SIDE[side],
+        End::Surface(event) => event.label,
     }
 }
 

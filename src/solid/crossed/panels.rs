@@ -2,7 +2,7 @@
 
 use super::places::{Family, Places};
 use super::sheet::{Line, zero};
-use super::{BRANCHES, Crossed, MOST_ROWS, Row, SIDE};
+use super::{BRANCHES, Crossed, MOST_ROWS, Row, SIDE, Sums};
 use crate::math::quadrature::{FIFTEEN, Integral, Nested, SEVEN, points};
 use smallvec::SmallVec;
 
@@ -98,22 +98,23 @@ fn stretches(mut places: Places) -> SmallVec<[Stretch; 24]> {
 }
 
 impl Crossed<'_> {
-    fn row_at(&self, family: Family, place: f64) -> Row {
+    fn row_at<S: Sums<N>, const N: usize>(&self, family: Family, place: f64) -> Row<N> {
         let mut through = family.through;
         through[family.moving] = place;
-        self.row(Line {
+        self.row::<S, N>(Line {
             along: family.along,
             through,
         })
     }
 
     /// The places of one body at which the intervals of a family's rows change.
-    fn changes_alone(&self, family: Family) -> SmallVec<[Stretch; 24]> {
+    fn changes_alone<S: Sums<N>, const N: usize>(&self, family: Family) -> SmallVec<[Stretch; 24]> {
         let all = stretches(self.places(family));
         let mut kept: SmallVec<[Stretch; 24]> = SmallVec::new();
-        let mut before: Option<Row> = None;
+        let mut before: Option<Row<N>> = None;
         for stretch in all {
-            let row = self.row_at(family, 0.5 * (stretch.ends[0] + stretch.ends[1]));
+            let middle = 0.5 * (stretch.ends[0] + stretch.ends[1]);
+            let row = self.row_at::<S, N>(family, middle);
             match (&before, kept.last_mut()) {
                 (Some(last), Some(whole))
                     if last.visible == row.visible && order(last).eq(order(&row)) =>
@@ -133,12 +134,56 @@ impl Crossed<'_> {
     }
 }
 
-/// The volume within the terms.
-pub(super) fn volume(
+/// Sums over rows, with an estimate of the error of each.
+#[derive(Debug, Clone, Copy)]
+struct Sum<const N: usize> {
+    values: [f64; N],
+    errors: [f64; N],
+}
+
+impl<const N: usize> Default for Sum<N> {
+    fn default() -> Self {
+        Self {
+            values: [0.0; N],
+            errors: [0.0; N],
+        }
+    }
+}
+
+impl<const N: usize> Sum<N> {
+    /// By a rule's values at its points.
+    fn by<const P: usize>(rule: &Nested<P>, values: &[[f64; N]; P]) -> Self {
+        let mut made = Self::default();
+        for n in 0..N {
+            let one = rule.sum(&values.map(|v| v[n]));
+            (made.values[n], made.errors[n]) = (one.value, one.error);
+        }
+        made
+    }
+
+    fn add(&mut self, other: &Self) {
+        for n in 0..N {
+            self.values[n] += other.values[n];
+            self.errors[n] += other.errors[n];
+        }
+    }
+
+    /// With every error wider by as much.
+    fn doubt(&mut self, error: f64) {
+        self.errors.iter_mut().for_each(|e| *e += error);
+    }
+
+    fn error(&self) -> f64 {
+        self.errors.iter().fold(0.0, |most, e| most.max(*e))
+    }
+}
+
+/// What is summed over the rows within the terms, over the whole voxel.
+pub(super) fn integrals<S: Sums<N>, const N: usize>(
     voxel: &Crossed,
     [along, moving, planes]: [usize; 3],
     tolerance: f64,
-) -> Integral {
+) -> [Integral; N] {
     let mut places = voxel.reaches(planes);
     for (rows, side) in [(along, moving), (moving, along)] {
         for at in SIDE_PLACES {
@@ -149,11 +194,11 @@ pub(super) fn volume(
                 moving: planes,
                 through,
             };
-            changes(voxel, family, &mut places);
+            changes::<S, N>(voxel, family, &mut places);
         }
     }
     let mut work: Vec<Stretch> = stretches(places).into_vec();
-    let mut total = Integral::default();
+    let mut total = Sum::<N>::default();
     let slice = |at: f64| {
         let mut through = [0.0; 3];
         through[planes] = at;
@@ -162,75 +207,75 @@ pub(super) fn volume(
             moving,
             through,
         };
-        area(voxel, family, INNER * tolerance)
+        area::<S, N>(voxel, family, INNER * tolerance)
     };
     while let Some(stretch) = work.pop() {
         if stretch.width() <= NARROW {
-            total.error += stretch.width();
+            total.doubt(stretch.width());
             continue;
         }
         match of_planes(voxel, stretch, STRETCH * tolerance, &slice) {
-            Ok(part) => {
-                total.value += part.value;
-                total.error += part.error;
-            }
+            Ok(part) => total.add(&part),
             Err(parts) => work.extend(parts.into_iter().rev()),
         }
     }
-    total
+    std::array::from_fn(|n| Integral {
+        value: total.values[n],
+        error: total.errors[n],
+    })
 }
 
 const SIDE_PLACES: [f64; 2] = [-0.5, 0.5];
 
-/// The area within the terms of a plane: the integral, and what stands for the edges that cut it.
+/// The sums over a plane, and what stands for the edges that cut it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Slice {
-    area: Integral,
+struct Slice<const N: usize> {
+    sum: Sum<N>,
     corners: u64,
 }
 
 /// One stretch of planes, or the parts it is to be cut into.
-fn of_planes(
+fn of_planes<const N: usize>(
     voxel: &Crossed,
     stretch: Stretch,
     tolerance: f64,
-    slice: &impl Fn(f64) -> Slice,
-) -> Result<Integral, [Stretch; 2]> {
+    slice: &impl Fn(f64) -> Slice<N>,
+) -> Result<Sum<N>, [Stretch; 2]> {
     let last = stretch.depth >= DEPTH || voxel.is_spent();
     let tolerance = tolerance.max(voxel.rounding);
     let quick = planes_by(&SEVEN, stretch, tolerance, slice, last)?;
-    if quick.error <= tolerance {
+    if quick.error() <= tolerance {
         return Ok(quick);
     }
     let long = planes_by(&FIFTEEN, stretch, tolerance, slice, last)?;
-    if long.error <= tolerance || last {
+    if long.error() <= tolerance || last {
         return Ok(long);
     }
     let middle = 0.5 * (stretch.ends[0] + stretch.ends[1]);
     Err(stretch.cut(middle, false))
 }
 
-fn planes_by<const N: usize>(
-    rule: &Nested<N>,
+fn planes_by<const P: usize, const N: usize>(
+    rule: &Nested<P>,
     stretch: Stretch,
     tolerance: f64,
-    slice: &impl Fn(f64) -> Slice,
+    slice: &impl Fn(f64) -> Slice<N>,
     last: bool,
-) -> Result<Integral, [Stretch; 2]> {
-    let mut values = [0.0; N];
-    let mut before: Option<(f64, Slice)> = None;
-    let mut change: Option<[(f64, Slice); 2]> = None;
+) -> Result<Sum<N>, [Stretch; 2]> {
+    let mut values = [[0.0; N]; P];
+    let mut before: Option<(f64, Slice<N>)> = None;
+    let mut change: Option<[(f64, Slice<N>); 2]> = None;
     let mut carried: f64 = 0.0;
-    let mut spread = Spread::default();
+    let mut spread = Spread::<N>::default();
     let [low, high] = stretch.verges();
     // The ends are looked at once.
-    let ends = N == 7 && !last;
+    let ends = P == 7 && !last;
     if ends {
         before = Some((low, slice(low)));
     }
     let us = points(rule);
-    for i in 0..=N {
-        if i == N && !ends {
+    for i in 0..=P {
+        if i == P && !ends {
             break;
         }
         let (at, slope) = us.get(i).map_or((high, 0.0), |u| stretch.place(*u));
@@ -244,10 +289,10 @@ fn planes_by<const N: usize>(
             }
         }
         before = Some((at, here));
-        carried = carried.max(here.area.error);
-        spread.add(here.area.value);
+        carried = carried.max(here.sum.error());
+        spread.add(&here.sum.values);
         if let Some(value) = values.get_mut(i) {
-            *value = here.area.value * slope;
+            *value = here.sum.values.map(|v| v * slope);
         }
     }
     let unknown = spread.width() * stretch.width();
@@ -260,12 +305,12 @@ fn planes_by<const N: usize>(
         }
         _ => {}
     }
-    let sum = rule.sum(&values);
+    let mut sum = Sum::by(rule, &values);
     let unknown = if change.is_some() { unknown } else { 0.0 };
-    Ok(Integral {
-        error: sum.error.max(unknown) + carried * stretch.width(),
-        ..sum
-    })
+    for error in &mut sum.errors {
+        *error = error.max(unknown) + carried * stretch.width();
+    }
+    Ok(sum)
 }
 
 /// Stretches narrower than this may be too slight for what changes in them to matter.
@@ -275,34 +320,42 @@ const UNKNOWN: f64 = 0.02;
 
 /// How far values lie apart.
 #[derive(Debug, Clone, Copy)]
-struct Spread([f64; 2]);
+struct Spread<const N: usize>([[f64; 2]; N]);
 
-impl Default for Spread {
+impl<const N: usize> Default for Spread<N> {
     fn default() -> Self {
-        Self([f64::INFINITY, f64::NEG_INFINITY])
+        Self([[f64::INFINITY, f64::NEG_INFINITY]; N])
     }
 }
 
-impl Spread {
-    fn add(&mut self, value: f64) {
-        self.0 = [self.0[0].min(value), self.0[1].max(value)];
+impl<const N: usize> Spread<N> {
+    fn add(&mut self, values: &[f64; N]) {
+        for (known, value) in self.0.iter_mut().zip(values) {
+            *known = [known[0].min(*value), known[1].max(*value)];
+        }
     }
 
     fn width(&self) -> f64 {
-        self.0[1] - self.0[0]
+        let widths = self.0.iter().map(|[low, high]| high - low);
+        widths.fold(0.0, f64::max)
     }
 }
 
+/// How far two sums lie apart.
+fn step<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let steps = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    steps.fold(0.0, f64::max)
+}
+
 /// Where the edges that planes cut change, to what that place may matter.
-fn change_of_planes(
-    mut from: (f64, Slice),
-    mut to: (f64, Slice),
+fn change_of_planes<const N: usize>(
+    mut from: (f64, Slice<N>),
+    mut to: (f64, Slice<N>),
     tolerance: f64,
-    slice: &impl Fn(f64) -> Slice,
+    slice: &impl Fn(f64) -> Slice<N>,
 ) -> f64 {
-    let matters = |a: &(f64, Slice), b: &(f64, Slice)| {
-        let step = (a.1.area.value - b.1.area.value).abs();
-        (b.0 - a.0) * step > 1e-2 * UNKNOWN * tolerance
+    let matters = |a: &(f64, Slice<N>), b: &(f64, Slice<N>)| {
+        (b.0 - a.0) * step(&a.1.sum.values, &b.1.sum.values) > 1e-2 * UNKNOWN * tolerance
     };
     while to.0 - from.0 > NARROW && matters(&from, &to) {
         let middle = 0.5 * (from.0 + to.0);
@@ -316,21 +369,20 @@ fn change_of_planes(
     0.5 * (from.0 + to.0)
 }
 
-/// The area within the terms of a plane.
-fn area(voxel: &Crossed, family: Family, tolerance: f64) -> Slice {
-    let mut work: SmallVec<[Stretch; 24]> = voxel.changes_alone(family);
+/// The sums over the rows of a plane.
+fn area<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, tolerance: f64) -> Slice<N> {
+    let mut work: SmallVec<[Stretch; 24]> = voxel.changes_alone::<S, N>(family);
     work.reverse();
     let mut found = Slice::default();
     let mut before: Option<SmallVec<[u32; 12]>> = None;
     while let Some(stretch) = work.pop() {
         if stretch.width() <= NARROW {
-            found.area.error += stretch.width();
+            found.sum.doubt(stretch.width());
             continue;
         }
-        match of_rows(voxel, family, stretch, STRETCH * tolerance) {
+        match of_rows::<S, N>(voxel, family, stretch, STRETCH * tolerance) {
             Ok((part, ends)) => {
-                found.area.value += part.value;
-                found.area.error += part.error;
+                found.sum.add(&part);
                 let corners = match &before {
                     None => ends
                         .iter()
@@ -381,72 +433,75 @@ fn corner(before: &[u32], after: &[u32]) -> u64 {
 type Ends = SmallVec<[u32; 12]>;
 
 /// One stretch of rows, or the parts it is to be cut into.
-fn of_rows(
+fn of_rows<S: Sums<N>, const N: usize>(
     voxel: &Crossed,
     family: Family,
     stretch: Stretch,
     tolerance: f64,
-) -> Result<(Integral, Ends), [Stretch; 2]> {
+) -> Result<(Sum<N>, Ends), [Stretch; 2]> {
     let last = stretch.depth >= DEPTH || voxel.is_spent();
     let tolerance = tolerance.max(voxel.rounding * stretch.width());
-    let (quick, ends) = rows_by(&SEVEN, voxel, family, stretch, tolerance, last)?;
-    if quick.error <= tolerance {
+    let (quick, ends) = rows_by::<S, 7, N>(&SEVEN, voxel, family, stretch, tolerance, last)?;
+    if quick.error() <= tolerance {
         return Ok((quick, ends));
     }
-    let (long, ends) = rows_by(&FIFTEEN, voxel, family, stretch, tolerance, last)?;
-    if long.error <= tolerance || last {
+    let (long, ends) = rows_by::<S, 15, N>(&FIFTEEN, voxel, family, stretch, tolerance, last)?;
+    if long.error() <= tolerance || last {
         return Ok((long, ends));
     }
     let middle = 0.5 * (stretch.ends[0] + stretch.ends[1]);
     Err(stretch.cut(middle, false))
 }
 
-fn rows_by<const N: usize>(
-    rule: &Nested<N>,
+fn rows_by<S: Sums<N>, const P: usize, const N: usize>(
+    rule: &Nested<P>,
     voxel: &Crossed,
     family: Family,
     stretch: Stretch,
     tolerance: f64,
     last: bool,
-) -> Result<(Integral, Ends), [Stretch; 2]> {
+) -> Result<(Sum<N>, Ends), [Stretch; 2]> {
     let us = points(rule);
-    let rows: SmallVec<[Row; 15]> = us
+    let rows: SmallVec<[Row<N>; 15]> = us
         .iter()
-        .map(|u| voxel.row_at(family, stretch.place(*u).0))
+        .map(|u| voxel.row_at::<S, N>(family, stretch.place(*u).0))
         .collect();
     let mut spread = Spread::default();
-    rows.iter().for_each(|r| spread.add(r.length));
+    rows.iter().for_each(|r| spread.add(&r.sums));
     let unknown = spread.width() * stretch.width();
     let slight = stretch.width() <= SLIGHT && unknown <= UNKNOWN * tolerance;
     if !(last || slight)
-        && let Some((place, graded)) = first_change(voxel, family, stretch, &us, &rows)
+        && let Some((place, graded)) = first_change::<S, N>(voxel, family, stretch, &us, &rows)
     {
         return Err(stretch.cut(place, graded));
     }
-    let mut values = [0.0; N];
+    let mut values = [[0.0; N]; P];
     for ((value, u), row) in values.iter_mut().zip(us).zip(&rows) {
-        *value = row.length * stretch.place(u).1;
+        let slope = stretch.place(u).1;
+        *value = row.sums.map(|sum| sum * slope);
     }
-    let ends = rows[N / 2].visible.clone();
-    let mut sum = rule.sum(&values);
+    let ends = rows[P / 2].visible.clone();
+    let mut sum = Sum::by(rule, &values);
     if slight || last && rows.iter().any(|r| r.visible != ends) {
-        sum.error = sum.error.max(unknown);
+        for error in &mut sum.errors {
+            *error = error.max(unknown);
+        }
     }
     Ok((sum, ends))
 }
 
 /// The first place within a stretch at which the intervals of its rows change, and whether as a square root.
-fn first_change(
+fn first_change<S: Sums<N>, const N: usize>(
     voxel: &Crossed,
     family: Family,
     stretch: Stretch,
     us: &[f64],
-    rows: &[Row],
+    rows: &[Row<N>],
 ) -> Option<(f64, bool)> {
     let place = |i: usize| stretch.place(us[i]).0;
     for i in 1..rows.len() {
         if rows[i - 1].visible != rows[i].visible {
-            return Some(change_of_rows(
+            return Some(change_of_rows::<S, N>(
                 voxel,
                 family,
                 [place(i - 1), place(i)],
@@ -456,13 +511,13 @@ fn first_change(
     }
     let n = rows.len();
     let compared = |at: f64, i: usize| {
-        let row = voxel.row_at(family, at);
+        let row = voxel.row_at::<S, N>(family, at);
         (row.visible != rows[i].visible).then(|| {
             let known = place(i);
             if at < known {
-                change_of_rows(voxel, family, [at, known], [&row, &rows[i]])
+                change_of_rows::<S, N>(voxel, family, [at, known], [&row, &rows[i]])
             } else {
-                change_of_rows(voxel, family, [known, at], [&rows[i], &row])
+                change_of_rows::<S, N>(voxel, family, [known, at], [&rows[i], &row])
             }
         })
     };
@@ -473,7 +528,7 @@ fn first_change(
     }
     // Where surfaces change places that end nothing, something may come to light between the changes.
     for i in 1..n {
-        let found = uncovered(
+        let found = uncovered::<S, N>(
             voxel,
             family,
             [place(i - 1), place(i)],
@@ -514,7 +569,7 @@ fn first_change(
 }
 
 /// All that crosses a row, and the voxel's sides, in order.
-fn order(row: &Row) -> impl Iterator<Item = u32> {
+fn order<const N: usize>(row: &Row<N>) -> impl Iterator<Item = u32> {
     let mut all: SmallVec<[(f64, u32); 26]> =
         row.events.iter().map(|e| (e.place, e.label)).collect();
     let before = all.iter().take_while(|e| e.0 <= -0.5).count();
@@ -526,11 +581,11 @@ fn order(row: &Row) -> impl Iterator<Item = u32> {
 
 /// A place between two rows of equal intervals at which they are others: between the places at which what crosses the rows
 /// changes its order.
-fn uncovered(
+fn uncovered<S: Sums<N>, const N: usize>(
     voxel: &Crossed,
     family: Family,
     [from, to]: [f64; 2],
-    [first, last]: [&Row; 2],
+    [first, last]: [&Row<N>; 2],
 ) -> Option<(f64, bool)> {
     let [a, b] = [first, last].map(|row| order(row).collect::<SmallVec<[u32; 26]>>());
     if a == b {
@@ -545,12 +600,12 @@ fn uncovered(
             if !b[..at].contains(&y) {
                 continue;
             }
-            let gap = |row: &Row| Some(place_of(row, y)? - place_of(row, x)?);
+            let gap = |row: &Row<N>| Some(place_of(row, y)? - place_of(row, x)?);
             let (Some(fa), Some(fb)) = (gap(first), gap(last)) else {
                 continue;
             };
             if (fa < 0.0) != (fb < 0.0) {
-                let f = |p: f64| gap(&voxel.row_at(family, p)).unwrap_or(0.0);
+                let f = |p: f64| gap(&voxel.row_at::<S, N>(family, p)).unwrap_or(0.0);
                 marks.push(zero(&f, [from, to], [fa, fb]));
             }
         }
@@ -559,20 +614,20 @@ fn uncovered(
     marks.sort_unstable_by(f64::total_cmp);
     marks.windows(2).find_map(|w| {
         let middle = 0.5 * (w[0] + w[1]);
-        let row = (w[1] - w[0] > NARROW).then(|| voxel.row_at(family, middle))?;
+        let row = (w[1] - w[0] > NARROW).then(|| voxel.row_at::<S, N>(family, middle))?;
         let differs = row.visible != first.visible;
-        differs.then(|| change_of_rows(voxel, family, [from, middle], [first, &row]))
+        differs.then(|| change_of_rows::<S, N>(voxel, family, [from, middle], [first, &row]))
     })
 }
 
 /// What crosses a row within the voxel.
-fn labels(row: &Row) -> impl Iterator<Item = u32> + '_ {
+fn labels<const N: usize>(row: &Row<N>) -> impl Iterator<Item = u32> + '_ {
     let within = row.events.iter().filter(|e| e.place.abs() < 0.5);
     within.map(|e| e.label)
 }
 
 /// How far what crosses a row is from each other, and from the voxel's sides.
-fn gaps(row: &Row) -> SmallVec<[f64; 24]> {
+fn gaps<const N: usize>(row: &Row<N>) -> SmallVec<[f64; 24]> {
     let mut found = SmallVec::new();
     let mut before = -0.5;
     for event in row.events.iter().filter(|e| e.place.abs() < 0.5) {
@@ -584,7 +639,7 @@ fn gaps(row: &Row) -> SmallVec<[f64; 24]> {
 }
 
 /// The place on a row of what has that label.
-fn place_of(row: &Row, label: u32) -> Option<f64> {
+fn place_of<const N: usize>(row: &Row<N>, label: u32) -> Option<f64> {
     if label == SIDE[0] {
         return Some(-0.5);
     }
@@ -596,11 +651,11 @@ fn place_of(row: &Row, label: u32) -> Option<f64> {
 }
 
 /// Where the intervals of rows change between two, and whether as a square root.
-fn change_of_rows(
+fn change_of_rows<S: Sums<N>, const N: usize>(
     voxel: &Crossed,
     family: Family,
     [from, to]: [f64; 2],
-    [first, last]: [&Row; 2],
+    [first, last]: [&Row<N>; 2],
 ) -> (f64, bool) {
     let (l, r) = (&first.visible, &last.visible);
     let differs = |i: &usize| l.get(*i) != r.get(*i);
@@ -611,7 +666,7 @@ fn change_of_rows(
         r.get(at).zip(r.get(at + 1)),
     ];
     for (a, b) in pairs.into_iter().flatten() {
-        let gap = |row: &Row| Some(place_of(row, *a)? - place_of(row, *b)?);
+        let gap = |row: &Row<N>| Some(place_of(row, *a)? - place_of(row, *b)?);
         let (Some(fa), Some(fb)) = (gap(first), gap(last)) else {
             continue;
         };
@@ -620,7 +675,7 @@ fn change_of_rows(
         }
         let failed = std::cell::Cell::new(false);
         let f = |p: f64| {
-            gap(&voxel.row_at(family, p)).unwrap_or_else(|| {
+            gap(&voxel.row_at::<S, N>(family, p)).unwrap_or_else(|| {
                 failed.set(true);
                 0.0
             })
@@ -631,23 +686,23 @@ fn change_of_rows(
         }
     }
     let (mut a, mut b) = (from, to);
-    let mut lengths = [first.length, last.length];
+    let mut sums = [first.sums, last.sums];
     // To what the place may matter, at the least tolerance.
-    while b - a > NARROW && (b - a) * (lengths[1] - lengths[0]).abs() > 1e-18 {
+    while b - a > NARROW && (b - a) * step(&sums[0], &sums[1]) > 1e-18 {
         let middle = 0.5 * (a + b);
-        let row = voxel.row_at(family, middle);
+        let row = voxel.row_at::<S, N>(family, middle);
         if row.visible == *l {
-            (a, lengths[0]) = (middle, row.length);
+            (a, sums[0]) = (middle, row.sums);
         } else {
-            (b, lengths[1]) = (middle, row.length);
+            (b, sums[1]) = (middle, row.sums);
         }
     }
     (0.5 * (a + b), true)
 }
 
 /// Adds the places at which the intervals of a family's rows change.
-fn changes(voxel: &Crossed, family: Family, out: &mut Places) {
-    let alone = voxel.changes_alone(family);
+fn changes<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, out: &mut Places) {
+    let alone = voxel.changes_alone::<S, N>(family);
     for stretch in &alone[1..] {
         out.push((stretch.ends[0], stretch.graded[0]));
     }
@@ -657,11 +712,11 @@ fn changes(voxel: &Crossed, family: Family, out: &mut Places) {
             continue;
         }
         let us = points(&SEVEN);
-        let rows: SmallVec<[Row; 15]> = us
+        let rows: SmallVec<[Row<N>; 15]> = us
             .iter()
-            .map(|u| voxel.row_at(family, stretch.place(*u).0))
+            .map(|u| voxel.row_at::<S, N>(family, stretch.place(*u).0))
             .collect();
-        if let Some((place, graded)) = first_change(voxel, family, stretch, &us, &rows) {
+        if let Some((place, graded)) = first_change::<S, N>(voxel, family, stretch, &us, &rows) {
             out.push((place, graded));
             work.extend(stretch.cut(place, graded));
         }

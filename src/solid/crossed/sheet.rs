@@ -108,6 +108,12 @@ impl Quadric {
         [q[i][i], b, c]
     }
 
+    /// Half its gradient.
+    fn slope(&self, p: [f64; 3]) -> DVec3 {
+        let row = |i: usize| (0..3).map(|j| self.squares[i][j] * p[j]).sum::<f64>();
+        DVec3::new(row(0), row(1), row(2)) + DVec3::from_array(self.linear)
+    }
+
     pub(super) fn at(&self, p: [f64; 3]) -> f64 {
         let [a, b, c] = self.along(0, p);
         (a * p[0] + 2.0 * b) * p[0] + c
@@ -256,6 +262,21 @@ impl<'a> Bend<'a> {
         self.circle.map(|c| (c.centre, c.radius))
     }
 
+    /// A vector along the normal (r, z) at a point of the piece.
+    fn normal(&self, [r, z]: [f64; 2]) -> [f64; 2] {
+        match self.circle {
+            Some(Circle { centre, .. }) => [r - centre[0], z - centre[1]],
+            None => {
+                // By the coordinate that moves more.
+                let sides = [0, 1].map(|c| (self.ends[1][c] - self.ends[0][c]).abs());
+                let c = usize::from(sides[1] > sides[0]);
+                let t = parameter(self.part.piece, c, [r, z][c]);
+                let [dr, dz] = self.part.piece.twin().slope(t);
+                [dz, -dr]
+            }
+        }
+    }
+
     /// The other coordinate where `c` is `v`; `None` beyond the piece.
     pub(super) fn at(&self, c: usize, v: f64) -> Option<f64> {
         let (a, b) = (self.ends[0][c], self.ends[1][c]);
@@ -353,6 +374,25 @@ pub(super) struct Surface<'a> {
 const FAR: f64 = 4.0;
 
 impl Surface<'_> {
+    /// A vector along the surface's normal at a place of a line, by the voxel's coordinates.
+    pub(super) fn slope(&self, affine: &Affine, line: Line, place: f64) -> DVec3 {
+        let mut p = line.through;
+        p[line.along] = place;
+        match &self.sheet {
+            Sheet::Cone { quadric, .. }
+            | Sheet::Sphere { quadric, .. }
+            | Sheet::Ball { quadric } => quadric.slope(p),
+            Sheet::Plane { form, .. } => DVec3::from_array(form.slope),
+            Sheet::Bent(bend) => {
+                let local = affine.at(p);
+                let [r, z] = bend.normal([local.x.hypot(local.y), local.z]);
+                let flat = local.truncate().normalize_or(glam::DVec2::X) * r;
+                let normal = flat.extend(z);
+                DVec3::from_array(affine.m.map(|m| m.dot(normal)))
+            }
+        }
+    }
+
     /// Adds the places at which a line crosses the surface.
     pub(super) fn crossings(
         &self,

@@ -201,6 +201,22 @@ impl ArcTree {
         best
     }
 
+    /// The nearest point of the arcs, where it is nearer than the limit.
+    pub(super) fn nearest(&self, p: DVec3, limit: f64) -> Option<DVec3> {
+        let mut best = limit;
+        let mut found = None;
+        self.boxes.visit_nearest(p, limit * limit, |i, _| {
+            let arc = &self.arcs[i];
+            let (distance, at) = arc.curve.nearest(p, arc.from, arc.to);
+            if distance < best {
+                best = distance;
+                found = Some(arc.curve.at(at));
+            }
+            best * best
+        });
+        found
+    }
+
     /// The arcs whose boxes come within `far` of a point, unless they are many.
     pub(super) fn within<const N: usize>(&self, p: DVec3, far: f64) -> Option<SmallVec<[u32; N]>>
     where

@@ -29,7 +29,9 @@ mod vicinity;
 mod visible;
 
 use super::body::Body;
+use super::surface_point::{Curvature, SurfacePoint};
 use super::terms::Term;
+use crate::math::Side;
 use arc::ArcTree;
 use cover::Cover;
 use feet::View;
@@ -131,6 +133,18 @@ impl Nearest {
         body_asked: impl Fn(usize, f64) -> bool,
         spot_asked: impl Fn(&Spot) -> bool,
     ) -> f64 {
+        let found = self.nearest_spot(p, limit, body_asked, spot_asked);
+        found.map_or(limit, |(distance, _)| distance)
+    }
+
+    /// The nearest visible foot below a limit, of the bodies and the spots that are asked.
+    fn nearest_spot(
+        &self,
+        p: DVec3,
+        limit: f64,
+        body_asked: impl Fn(usize, f64) -> bool,
+        spot_asked: impl Fn(&Spot) -> bool,
+    ) -> Option<(f64, Spot)> {
         let scene = &self.scene;
         let mut all: SmallVec<[(f64, Spot); 32]> = SmallVec::new();
         for (index, body) in scene.bodies.iter().enumerate() {
@@ -149,10 +163,51 @@ impl Nearest {
         while let Some((at, _)) = (all.iter().enumerate()).min_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
             let (distance, spot) = all.swap_remove(at);
             if spot_asked(&spot) && scene.is_visible(spot) {
-                return distance;
+                return Some((distance, spot));
             }
         }
-        limit
+        None
+    }
+
+    /// The nearest point of the boundary, on a face or an edge; `None` where there is none, or none is found.
+    pub(super) fn surface_point(&self, point: DVec3) -> Option<SurfacePoint> {
+        let p = point - self.middle;
+        if !(p.abs().max_element() <= FAR * self.scene.size) {
+            return None;
+        }
+        let edge = self.edges.nearest(p, f64::INFINITY);
+        let limit = edge.map_or(f64::INFINITY, |at| at.distance(p));
+        let found = match self.nearest_spot(p, limit, |_, _| true, |_| true) {
+            Some((_, spot)) => {
+                let body = &self.scene.bodies[spot.body];
+                let inside = body.side(spot.point) != Side::Outside;
+                // The spot is on the body, or as near to it as rounding.
+                let at = body.surface_point(spot.point, inside);
+                at.map(|at| {
+                    let along = spot.normal.dot(at.normal);
+                    // Beside an edge the body's own nearest face may be the other one.
+                    let is_same = along.abs() > 0.9;
+                    SurfacePoint {
+                        normal: spot.normal * along.signum(),
+                        curvature: if is_same {
+                            at.curvature
+                        } else {
+                            Curvature::default()
+                        },
+                        ..at
+                    }
+                })
+            }
+            None => edge.map(|point| SurfacePoint {
+                point,
+                normal: (p - point).normalize_or(DVec3::X),
+                curvature: Curvature::default(),
+            }),
+        }?;
+        Some(SurfacePoint {
+            point: found.point + self.middle,
+            ..found
+        })
     }
 }
 
