@@ -272,10 +272,63 @@ class Checks:
             shown = subprocess.run(["vdb_print", "-l", path], capture_output=True, text=True)
             assert shown.returncode == 0 and "surface" in shown.stdout, shown.stderr
 
+    def faces(self):
+        """Shares of sides: one more along their axis, the first at the corner of the grid."""
+        import h5py
+        import nrrd
+        import SimpleITK as sitk
+        import vtk
+        import xarray
+        from vtk.util.numpy_support import vtk_to_numpy
+
+        names = ["face-x", "face-y", "face-z"]
+        channels = ["--channels", ",".join(names)]
+        path = self.out("faces", "--formats", "npy,nrrd,mhd,raw,zarr,h5,vti,exr", *channels)
+        packed = self.out(
+            "packed", "--formats", "nrrd,zarr", "--nrrd-encoding", "gzip", "--zarr-codec", "zstd", *channels
+        )
+        # A grid that is larger has the last sides as lower ones of other voxels.
+        larger = [n + 1 for n in DIMS]
+        wide = self.out("wide", "--formats", "npy", "--set", f"grid.dims={larger}", *channels)
+        hdf = h5py.File(f"{path}/marked_solid.h5")
+        reader = vtk.vtkXMLImageDataReader()
+        reader.SetFileName(f"{path}/marked_solid.vti")
+        reader.Update()
+        for axis, name in enumerate(names):
+            dims = [n + (a == axis) for a, n in enumerate(DIMS)]
+            values = np.load(f"{path}/{name}.npy")
+            assert values.shape == tuple(reversed(dims)) and values.dtype == "f4"
+            assert 0 < values.mean() < 1
+            found = np.load(f"{wide}/{name}.npy")[: dims[2], : dims[1], : dims[0]]
+            assert np.abs(found - values).max() <= 1e-7, np.abs(found - values).max()
+            first = [o + (a != axis) * d / 2 for a, (o, d) in enumerate(zip(ORIGIN, SPACING))]
+            raw = np.fromfile(f"{path}/{name}.raw", "<f4").reshape(values.shape)
+            same(raw, values, ("raw", name))
+            for folder in (path, packed):
+                data, head = nrrd.read(f"{folder}/{name}.nrrd", index_order="C")
+                same(data, values, ("nrrd", folder, name))
+                assert near(head["space origin"], first)
+                data = xarray.open_zarr(f"{folder}/marked_solid.zarr")[name]
+                same(data.values, values, ("zarr", folder, name))
+                wanted = ["z", "y", "x"]
+                wanted[2 - axis] += "_face"
+                assert list(data.dims) == wanted
+                ends = [float(data[dim][0]) for dim in reversed(wanted)]
+                assert near(ends, first)
+            image = sitk.ReadImage(f"{path}/{name}.mhd")
+            same(sitk.GetArrayFromImage(image), values, ("mhd", name))
+            assert near(image.GetOrigin(), first)
+            same(hdf[name][:], values, ("h5", name))
+            assert near(hdf[name].attrs["first"], first)
+            lower = values[: DIMS[2], : DIMS[1], : DIMS[0]]
+            same(hdf["VTKHDF/CellData"][name][:], lower, ("VTKHDF", name))
+            array = reader.GetOutput().GetCellData().GetArray(name)
+            same(vtk_to_numpy(array).reshape(DIMS[::-1]), lower, ("vti", name))
+
 
 if __name__ == "__main__":
     VOXLATHE = os.path.abspath(sys.argv[1])
-    wanted = sys.argv[2:] or ["npy", "nrrd", "mhd", "vti", "zarr", "h5", "vdb"]
+    wanted = sys.argv[2:] or ["npy", "nrrd", "mhd", "vti", "zarr", "h5", "faces", "vdb"]
     with tempfile.TemporaryDirectory() as place:
         checks = Checks(place)
         for name in wanted:

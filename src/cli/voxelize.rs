@@ -525,7 +525,9 @@ fn stream(
         // An interrupted layer is not whole.
         interrupt::check()?;
         let sampled = Instant::now();
-        writer.write_layer(k, &layer(&plan.channels, buffers))?;
+        let last = buffers.last_sides.iter();
+        let last: Vec<(&str, &[f32])> = last.map(|(c, values)| (c.name(), &values[..])).collect();
+        writer.write_layer_with_last(k, &layer(&plan.channels, buffers), &last)?;
         let mut all = tally.lock().unwrap_or_else(PoisonError::into_inner);
         all.0.add(&buffers.tally);
         all.1[k] = buffers.fraction_sum;

@@ -58,6 +58,8 @@ pub struct Layer<'a> {
     pub k: usize,
     /// Its samples by channel, in the order of the stack's channels.
     pub channels: &'a [(&'a str, Samples<'a>)],
+    /// What each channel has beyond the last voxel, where it is staggered.
+    pub last: &'a [&'a [f32]],
     /// Shown each row once, in order; see [`look`](Self::look).
     pub watch: &'a dyn Fn(Range<usize>) -> Result<(), String>,
 }
@@ -71,6 +73,24 @@ impl Debug for Layer<'_> {
 }
 
 impl Layer<'_> {
+    /// The layers that an array of its own shape has of a channel: numbers and bytes. There are two where the sides
+    /// across z end.
+    pub(super) fn parts(&self, of: &Description, channel: usize) -> Vec<(usize, Cow<'_, [u8]>)> {
+        let bytes = little_endian(&self.channels[channel].1);
+        let last = little_endian(&Samples::Float(self.last[channel]));
+        match of.channels[channel].staggered {
+            Some(0) => {
+                let row = of.grid.dims()[0] * 4;
+                let rows = bytes.chunks_exact(row).zip(last.chunks_exact(4));
+                let wider = rows.flat_map(|(row, end)| row.iter().chain(end).copied());
+                vec![(self.k, Cow::Owned(wider.collect()))]
+            }
+            Some(1) => vec![(self.k, Cow::Owned([&bytes[..], &last[..]].concat()))],
+            Some(_) if !last.is_empty() => vec![(self.k, bytes), (self.k + 1, last)],
+            _ => vec![(self.k, bytes)],
+        }
+    }
+
     /// Has the samples of these rows looked at while they are in the cache; what was looked at before is left out.
     ///
     /// # Errors
@@ -155,6 +175,12 @@ pub enum FormatKind {
 }
 
 impl FormatKind {
+    /// Whether it holds the last sides of staggered channels.
+    #[must_use]
+    pub fn is_staggered(&self) -> bool {
+        !matches!(self, Self::Exr(_) | Self::Vti { .. } | Self::Vdb { .. })
+    }
+
     /// Its name, and the ending of its files.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -342,6 +368,13 @@ pub(super) struct Lattice {
     pub(super) spacing: [f64; 3],
 }
 
+impl Lattice {
+    /// Bytes of one layer of a channel that is here.
+    pub(super) fn layer_bytes(&self, channel: &ChannelSpec) -> usize {
+        self.dims[0] * self.dims[1] * Element::of(channel.kind).bytes()
+    }
+}
+
 impl Description {
     /// The scene's name as that of a file: what is outside ASCII letters, digits and `._-` is `_`.
     #[must_use]
@@ -359,8 +392,18 @@ impl Description {
         (self.file.clone()).unwrap_or_else(|| format!("{}.{ending}", plain(&channel.name)))
     }
 
-    /// Where the samples of a channel are: at voxel centres.
-    pub(super) fn lattice(&self) -> Lattice {
+    /// Where the samples of a channel are: at voxel centres, or at sides across one axis.
+    pub(super) fn lattice(&self, channel: &ChannelSpec) -> Lattice {
+        let mut lattice = self.centres();
+        if let Some(axis) = channel.staggered {
+            lattice.dims[axis] += 1;
+            lattice.first[axis] = self.grid.origin().to_array()[axis];
+        }
+        lattice
+    }
+
+    /// Where the voxel centres are.
+    pub(super) fn centres(&self) -> Lattice {
         Lattice {
             dims: self.grid.dims(),
             first: self.grid.centre(0, 0, 0).to_array(),
@@ -368,7 +411,7 @@ impl Description {
         }
     }
 
-    /// Bytes of one layer of a channel.
+    /// Bytes of one layer of a channel's voxels.
     pub(super) fn layer_bytes(&self, channel: &ChannelSpec) -> usize {
         self.grid.layer_len() * Element::of(channel.kind).bytes()
     }
@@ -379,9 +422,18 @@ impl Description {
         each.sum()
     }
 
-    /// Bytes of the samples of all channels.
-    pub(super) fn array_bytes(&self) -> u64 {
+    /// Bytes of the samples of all channels' voxels.
+    pub(super) fn voxel_bytes(&self) -> u64 {
         (self.all_layer_bytes()).saturating_mul(self.grid.dims()[2] as u64)
+    }
+
+    /// Bytes of the samples of all channels, last sides included.
+    pub(super) fn array_bytes(&self) -> u64 {
+        let each = self.channels.iter().map(|channel| {
+            let lattice = self.lattice(channel);
+            (lattice.layer_bytes(channel) as u64).saturating_mul(lattice.dims[2] as u64)
+        });
+        each.fold(0, u64::saturating_add)
     }
 
     /// What the sign means, where there is one to explain.
@@ -521,9 +573,16 @@ pub(super) mod tests {
                 };
                 (c.name.as_str(), samples)
             });
+            let last = of.channels.iter().map(|c| match c.staggered {
+                Some(0) => &floats[..of.grid.dims()[1]],
+                Some(1) => &floats[..of.grid.dims()[0]],
+                Some(_) if k + 1 == of.grid.dims()[2] => &floats[..],
+                _ => &[],
+            });
             let layer = Layer {
                 k,
                 channels: &layer.collect::<Vec<_>>(),
+                last: &last.collect::<Vec<_>>(),
                 watch: &|_| Ok(()),
             };
             for format in &formats {
@@ -584,6 +643,9 @@ pub(super) mod tests {
             ("occupancy", SampleKind::Half),
             ("sdf", SampleKind::Float),
             ("material", SampleKind::Uint),
+            ("face-x", SampleKind::Float),
+            ("face-y", SampleKind::Float),
+            ("face-z", SampleKind::Float),
         ]);
         let vdb = FormatKind::Vdb { half_width: 0.7 };
         for kind in ALL.into_iter().chain([vdb]) {

@@ -42,15 +42,15 @@ impl Format for GridFile {
 }
 
 fn document(of: &Description, formats: &[&str]) -> Value {
-    let lattice = of.lattice();
-    let [nx, ny, nz] = lattice.dims;
     let channels = of.channels.iter().map(|channel| {
+        let lattice = of.lattice(channel);
+        let [nx, ny, nz] = lattice.dims;
         json!({
             "name": channel.name,
             "files": formats.iter().map(|f| of.channel_file(channel, f)).collect::<Vec<_>>(),
             "dtype": Element::of(channel.kind).numpy(),
             "shape": [nz, ny, nx],
-            "first_centre": lattice.first,
+            "first": lattice.first,
             "meaning": channel.meaning,
             "unit": channel.unit,
         })

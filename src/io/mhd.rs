@@ -51,7 +51,7 @@ impl Format for Images {
 }
 
 fn header(of: &Description, channel: &ChannelSpec) -> String {
-    let lattice = of.lattice();
+    let lattice = of.lattice(channel);
     let kind = match Element::of(channel.kind) {
         Element::U8 => "MET_UCHAR",
         Element::U32 => "MET_UINT",

@@ -5,39 +5,40 @@
 //! Source: NumPy Enhancement Proposal 1, *A Simple File Format for NumPy Arrays*, version 1.0.
 
 use super::error::IoError;
-use super::format::{Description, Element, Format, Layer, little_endian};
+use super::format::{Description, Element, Format, Layer};
 use super::manifest::FileRecord;
-use super::raw::Array;
+use super::raw::{Array, spread};
 use super::staged::StagedFiles;
 
 /// An array for each channel.
 #[derive(Debug)]
-pub(super) struct Arrays(Vec<Array>);
+pub(super) struct Arrays {
+    of: Description,
+    arrays: Vec<Array>,
+}
 
 impl Arrays {
     pub(super) fn begin(files: &StagedFiles, of: &Description) -> Result<Self, IoError> {
         let arrays = of.channels.iter().enumerate().map(|(n, channel)| {
-            let head = head(Element::of(channel.kind), of.lattice().dims);
+            let head = head(Element::of(channel.kind), of.lattice(channel).dims);
             let name = of.channel_file(channel, "npy");
             Array::begin(files, of, n, &name, &head)
         });
-        arrays.collect::<Result<_, _>>().map(Self)
+        Ok(Self {
+            arrays: arrays.collect::<Result<_, _>>()?,
+            of: of.clone(),
+        })
     }
 }
 
 impl Format for Arrays {
     fn layer(&self, _files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
-        for (array, (_, samples)) in self.0.iter().zip(layer.channels) {
-            array.layer(layer.k, &little_endian(samples))?;
-        }
-        Ok(())
+        spread(&self.of, &self.arrays, layer)
     }
 
     fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
-        self.0
-            .into_iter()
-            .map(|array| array.finish(files))
-            .collect()
+        let arrays = self.arrays.into_iter();
+        arrays.map(|array| array.finish(files)).collect()
     }
 }
 

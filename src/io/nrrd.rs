@@ -16,11 +16,10 @@ use flate2::Crc;
 use super::deflate;
 use super::error::IoError;
 use super::format::{
-    BUFFER, Description, Element, Format, Layer, Needs, NrrdEncoding, decimal, digest_bytes,
-    little_endian, record,
+    BUFFER, Description, Element, Format, Layer, Needs, NrrdEncoding, decimal, digest_bytes, record,
 };
 use super::manifest::FileRecord;
-use super::raw::Array;
+use super::raw::{Array, spread};
 use super::stack::ChannelSpec;
 use super::staged::{Groups, OrderedFile, StagedFiles};
 
@@ -73,55 +72,62 @@ pub(super) fn begin(
                 let head = header(of, channel, "raw");
                 Array::begin(files, of, n, &name(channel), head.as_bytes())
             });
-            Box::new(Plain(arrays.collect::<Result<_, _>>()?))
+            Box::new(Plain {
+                arrays: arrays.collect::<Result<_, _>>()?,
+                of: of.clone(),
+            })
         }
         NrrdEncoding::Gzip => {
             let streams = of.channels.iter().map(|channel| {
                 let head = header(of, channel, "gzip").into_bytes();
                 Stream::begin(files, of, channel, &name(channel), head)
             });
-            Box::new(Gzipped(streams.collect::<Result<_, _>>()?))
+            Box::new(Gzipped {
+                streams: streams.collect::<Result<_, _>>()?,
+                of: of.clone(),
+            })
         }
     })
 }
 
 /// Arrays as they are.
 #[derive(Debug)]
-struct Plain(Vec<Array>);
+struct Plain {
+    of: Description,
+    arrays: Vec<Array>,
+}
 
 impl Format for Plain {
     fn layer(&self, _files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
-        for (array, (_, samples)) in self.0.iter().zip(layer.channels) {
-            array.layer(layer.k, &little_endian(samples))?;
-        }
-        Ok(())
+        spread(&self.of, &self.arrays, layer)
     }
 
     fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
-        self.0
-            .into_iter()
-            .map(|array| array.finish(files))
-            .collect()
+        let arrays = self.arrays.into_iter();
+        arrays.map(|array| array.finish(files)).collect()
     }
 }
 
 /// Arrays as gzip streams.
 #[derive(Debug)]
-struct Gzipped(Vec<Stream>);
+struct Gzipped {
+    of: Description,
+    streams: Vec<Stream>,
+}
 
 impl Format for Gzipped {
     fn layer(&self, files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
-        for (stream, (_, samples)) in self.0.iter().zip(layer.channels) {
-            stream.layer(files, layer.k, &little_endian(samples))?;
+        for (channel, stream) in self.streams.iter().enumerate() {
+            for (k, bytes) in layer.parts(&self.of, channel) {
+                stream.layer(files, k, &bytes)?;
+            }
         }
         Ok(())
     }
 
     fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
-        self.0
-            .into_iter()
-            .map(|stream| stream.finish(files))
-            .collect()
+        let streams = self.streams.into_iter();
+        streams.map(|stream| stream.finish(files)).collect()
     }
 }
 
@@ -146,7 +152,8 @@ impl Stream {
         mut head: Vec<u8>,
     ) -> Result<Self, IoError> {
         head.extend(GZIP);
-        let groups = Groups::new(of.layer_bytes(channel), of.grid.dims()[2]);
+        let lattice = of.lattice(channel);
+        let groups = Groups::new(lattice.layer_bytes(channel), lattice.dims[2]);
         Ok(Self {
             file: OrderedFile::create(files, name, head.len() as u64)?,
             head,
@@ -192,7 +199,7 @@ impl Stream {
 }
 
 fn header(of: &Description, channel: &ChannelSpec, encoding: &str) -> String {
-    let lattice = of.lattice();
+    let lattice = of.lattice(channel);
     let kind = match Element::of(channel.kind) {
         Element::U8 => "uint8",
         Element::U32 => "uint32",

@@ -3,7 +3,7 @@
 //! `CHANNEL.raw` is also what a `.mhd` header describes; where both are asked for it is written once.
 
 use super::error::IoError;
-use super::format::{Description, Format, Layer, little_endian, record};
+use super::format::{Description, Format, Layer, record};
 use super::manifest::FileRecord;
 use super::staged::{FixedFile, StagedFiles};
 
@@ -15,6 +15,16 @@ pub(super) struct Array {
     layer_bytes: u64,
 }
 
+/// Gives each array its part of a layer.
+pub(super) fn spread(of: &Description, arrays: &[Array], layer: &Layer<'_>) -> Result<(), IoError> {
+    for (channel, array) in arrays.iter().enumerate() {
+        for (k, bytes) in layer.parts(of, channel) {
+            array.layer(k, &bytes)?;
+        }
+    }
+    Ok(())
+}
+
 impl Array {
     /// Begins the file of a channel: `head`, and the samples after it.
     pub(super) fn begin(
@@ -24,9 +34,11 @@ impl Array {
         name: &str,
         head: &[u8],
     ) -> Result<Self, IoError> {
-        let layer_bytes = of.layer_bytes(&of.channels[channel]) as u64;
+        let channel = &of.channels[channel];
+        let lattice = of.lattice(channel);
+        let layer_bytes = lattice.layer_bytes(channel) as u64;
         let start = head.len() as u64;
-        let length = start + layer_bytes * of.grid.dims()[2] as u64;
+        let length = start + layer_bytes * lattice.dims[2] as u64;
         let file = FixedFile::create(files, name, length)?;
         file.write(0, head)?;
         Ok(Self {
@@ -48,7 +60,10 @@ impl Array {
 
 /// An array for each channel.
 #[derive(Debug)]
-pub(super) struct Arrays(Vec<Array>);
+pub(super) struct Arrays {
+    of: Description,
+    arrays: Vec<Array>,
+}
 
 impl Arrays {
     /// * `wanted`: whether they are not another format's already.
@@ -62,22 +77,20 @@ impl Arrays {
             let name = of.channel_file(&of.channels[channel], "raw");
             Array::begin(files, of, channel, &name, &[])
         };
-        (0..count).map(begin).collect::<Result<_, _>>().map(Self)
+        Ok(Self {
+            arrays: (0..count).map(begin).collect::<Result<_, _>>()?,
+            of: of.clone(),
+        })
     }
 }
 
 impl Format for Arrays {
     fn layer(&self, _files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
-        let arrays = self.0.iter().zip(layer.channels);
-        arrays
-            .map(|(array, (_, samples))| array.layer(layer.k, &little_endian(samples)))
-            .collect()
+        spread(&self.of, &self.arrays, layer)
     }
 
     fn finish(self: Box<Self>, files: &StagedFiles) -> Result<Vec<FileRecord>, IoError> {
-        self.0
-            .into_iter()
-            .map(|array| array.finish(files))
-            .collect()
+        let arrays = self.arrays.into_iter();
+        arrays.map(|array| array.finish(files)).collect()
     }
 }

@@ -5,15 +5,16 @@
 //!
 //! Source: The HDF Group, *HDF5 File Format Specification*, version 3.0, III.A.1 (version 1 B-trees).
 
+use std::borrow::Cow;
 use std::fs;
 use std::io;
 use std::os::unix::fs::FileExt as _;
 
-use super::head::{self, Held};
+use super::head::{self, Array, Held};
 use super::object::UNDEFINED;
 use crate::io::deflate;
 use crate::io::error::IoError;
-use crate::io::format::{Description, Element, Format, Layer, Needs, little_endian, record};
+use crate::io::format::{Description, Element, Format, Layer, Needs, record};
 use crate::io::manifest::FileRecord;
 use crate::io::staged::{Groups, OrderedFile, StagedFiles};
 
@@ -50,7 +51,7 @@ pub(super) fn needs(of: &Description, head: u64) -> Needs {
 pub(super) struct File {
     of: Description,
     file: OrderedFile,
-    groups: Vec<Groups>,
+    arrays: Vec<(Array, Groups)>,
     head: u64,
     depth: usize,
 }
@@ -60,18 +61,17 @@ impl File {
         let depth = depth(of);
         let none = Held::Chunks {
             layers: depth as u64,
-            trees: vec![0; of.channels.len()],
+            trees: vec![0; head::arrays(of).len()],
             length: 0,
         };
         let head = head::of(of, &none).bytes.len() as u64;
-        let layers = of.grid.dims()[2];
-        let groups = of.channels.iter().map(|channel| {
-            // As if the last chunk were whole.
-            Groups::of_layers(depth, of.layer_bytes(channel), layers)
+        let arrays = head::arrays(of).into_iter().map(|array| {
+            let groups = Groups::of_layers(depth, array.layer_bytes, array.dims[2]);
+            (array, groups)
         });
         Ok(Self {
             file: OrderedFile::create(files, &of.whole_file("h5"), head)?,
-            groups: groups.collect(),
+            arrays: arrays.collect(),
             of: of.clone(),
             head,
             depth,
@@ -81,19 +81,19 @@ impl File {
 
 impl Format for File {
     fn layer(&self, files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
-        let count = self.groups.len();
-        for (channel, (groups, (_, samples))) in self.groups.iter().zip(layer.channels).enumerate()
-        {
-            groups.add(layer.k, &little_endian(samples), |piece, bytes| {
-                let compressed = if bytes.len() < groups.piece_bytes() {
-                    let mut whole = bytes.to_vec();
-                    whole.resize(groups.piece_bytes(), 0);
-                    deflate::zlib(&whole)
-                } else {
-                    deflate::zlib(bytes)
-                };
-                self.file.add(files, piece * count + channel, &compressed)
-            })?;
+        let count = self.arrays.len();
+        for (number, (array, groups)) in self.arrays.iter().enumerate() {
+            for (k, bytes) in array.parts(&self.of, layer) {
+                groups.add(k, &bytes, |piece, bytes| {
+                    let mut whole = Cow::Borrowed(bytes);
+                    if bytes.len() < groups.piece_bytes() {
+                        // The last chunk is as large as the others.
+                        whole.to_mut().resize(groups.piece_bytes(), 0);
+                    }
+                    let compressed = deflate::zlib(&whole);
+                    self.file.add(files, piece * count + number, &compressed)
+                })?;
+            }
         }
         Ok(())
     }
@@ -102,22 +102,34 @@ impl Format for File {
         let Self {
             of,
             file,
-            groups,
+            arrays,
             head,
             depth,
         } = *self;
+        // An array that is one layer longer may have a chunk more: the others have nothing there.
+        let count = arrays.len();
+        let most = arrays
+            .iter()
+            .map(|(_, groups)| groups.count())
+            .max()
+            .unwrap_or(0);
+        for (number, (_, groups)) in arrays.iter().enumerate() {
+            for piece in groups.count()..most {
+                file.add(files, piece * count + number, &[])?;
+            }
+        }
         let ending = |file: &fs::File, end: u64, sizes: &[u64]| {
-            let [nx, ny, _] = of.grid.dims().map(|n| n as u64);
             let mut at = head;
-            let mut chunks = vec![Vec::new(); groups.len()];
-            for (n, &size) in sizes.iter().enumerate() {
-                chunks[n % groups.len()].push((at, size));
+            let mut chunks = vec![Vec::new(); count];
+            for (n, &size) in sizes.iter().enumerate().filter(|(_, size)| **size > 0) {
+                chunks[n % count].push((at, size));
                 at += size;
             }
             let mut next = end.next_multiple_of(8);
             let mut trees = Vec::new();
-            for (channel, chunks) in of.channels.iter().zip(&chunks) {
-                let element = Element::of(channel.kind).bytes() as u64;
+            for ((array, _), chunks) in arrays.iter().zip(&chunks) {
+                let element = Element::of(of.channels[array.channel].kind).bytes() as u64;
+                let [nx, ny, _] = array.dims.map(|n| n as u64);
                 let (bytes, root) = tree(chunks, next, [depth as u64, ny, nx, element])?;
                 file.write_all_at(&bytes, next)?;
                 next += bytes.len() as u64;

@@ -9,10 +9,48 @@ use crate::io::format::{Description, Element};
 #[derive(Debug)]
 pub(super) struct Head {
     pub(super) bytes: Vec<u8>,
-    /// Where each channel's array begins.
+    /// Where each array begins.
     pub(super) arrays: Vec<u64>,
     /// Bytes of the whole file.
     pub(super) length: u64,
+}
+
+/// An array of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Array {
+    /// Its channel.
+    pub(super) channel: usize,
+    /// Samples along x, y and z.
+    pub(super) dims: [usize; 3],
+    /// Whether it has the last sides of a staggered channel, too.
+    pub(super) has_last: bool,
+    /// Bytes of a layer.
+    pub(super) layer_bytes: usize,
+}
+
+/// The arrays: one for each channel, then, for VTK, those of staggered channels without the last sides.
+pub(super) fn arrays(of: &Description) -> Vec<Array> {
+    let one = |channel: usize, has_last: bool| {
+        let spec = &of.channels[channel];
+        let lattice = if has_last {
+            of.lattice(spec)
+        } else {
+            of.centres()
+        };
+        Array {
+            channel,
+            dims: lattice.dims,
+            has_last,
+            layer_bytes: lattice.layer_bytes(spec),
+        }
+    };
+    let is_staggered = |channel: &usize| of.channels[*channel].staggered.is_some();
+    let all = 0..of.channels.len();
+    let own = all
+        .clone()
+        .map(|channel| one(channel, is_staggered(&channel)));
+    own.chain(all.filter(is_staggered).map(|channel| one(channel, false)))
+        .collect()
 }
 
 /// How the channels' arrays are held.
@@ -33,10 +71,11 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Lays the file out. Headers have the same size whatever addresses are in them, so they are made twice: first to know
 /// how large they are.
 pub(super) fn of(of: &Description, held: &Held) -> Head {
+    let arrays = arrays(of);
     let mut places = Places {
-        headers: vec![0; 3 + AXES.len() + of.channels.len()],
+        headers: vec![0; 3 + AXES.len() + arrays.len()],
         axes: [0; 3],
-        arrays: vec![0; of.channels.len()],
+        arrays: vec![0; arrays.len()],
     };
     let mut at = FIXED_HEAD;
     for (place, header) in headers(of, held, &places).iter().enumerate() {
@@ -50,10 +89,9 @@ pub(super) fn of(of: &Description, held: &Held) -> Head {
     let start = at;
     let length = match held {
         Held::Contiguous => {
-            for (channel, place) in of.channels.iter().zip(&mut places.arrays) {
+            for (array, place) in arrays.iter().zip(&mut places.arrays) {
                 *place = at;
-                let layers = of.grid.dims()[2] as u64;
-                at = aligned(at + of.layer_bytes(channel) as u64 * layers);
+                at = aligned(at + array.layer_bytes as u64 * array.dims[2] as u64);
             }
             at
         }
@@ -87,7 +125,7 @@ fn aligned(at: u64) -> u64 {
 
 /// Addresses, all of them multiples of 8.
 struct Places {
-    /// The root group, `VTKHDF`, its `CellData`, the axes, the channels.
+    /// The root group, `VTKHDF`, its `CellData`, the axes, the arrays.
     headers: Vec<u64>,
     axes: [u64; 3],
     arrays: Vec<u64>,
@@ -96,9 +134,21 @@ struct Places {
 fn headers(of: &Description, held: &Held, places: &Places) -> Vec<Vec<u8>> {
     let dims = of.grid.dims().map(|n| n as u64);
     let [nx, ny, nz] = dims;
-    let channels = of.channels.iter().map(|c| c.name.as_str());
-    let (at_axes, at_channels) = places.headers[3..].split_at(AXES.len());
-    let of_channels: Vec<(&str, u64)> = channels.zip(at_channels.iter().copied()).collect();
+    let (at_axes, at_arrays) = places.headers[3..].split_at(AXES.len());
+    let arrays = arrays(of);
+    // VTK's are the last ones of a channel.
+    let mut of_channels: Vec<(&str, u64)> = Vec::new();
+    let mut of_cells: Vec<(&str, u64)> = Vec::new();
+    for (array, &at) in arrays.iter().zip(at_arrays) {
+        let name = of.channels[array.channel].name.as_str();
+        match of_channels.get(array.channel) {
+            None => {
+                of_channels.push((name, at));
+                of_cells.push((name, at));
+            }
+            Some(_) => of_cells[array.channel].1 = at,
+        }
+    }
     let of_axes = AXES.into_iter().zip(at_axes.iter().copied());
     let links: Vec<(&str, u64)> = (of_channels.iter().copied())
         .chain(of_axes)
@@ -127,7 +177,7 @@ fn headers(of: &Description, held: &Held, places: &Places) -> Vec<Vec<u8>> {
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     image.attribute("Direction", &Attribute::Floats(&identity));
     let mut cells = Header::default();
-    group(&mut cells, &of_channels);
+    group(&mut cells, &of_cells);
     let mut headers = vec![root.finish(), image.finish(), cells.finish()];
     for (axis, name) in AXES.iter().enumerate() {
         let mut header = Header::default();
@@ -139,7 +189,9 @@ fn headers(of: &Description, held: &Held, places: &Places) -> Vec<Vec<u8>> {
         header.attribute("units", &Attribute::Text(&of.units));
         headers.push(header.finish());
     }
-    for (channel, at) in of.channels.iter().zip(&places.arrays) {
+    for (array, at) in arrays.iter().zip(&places.arrays) {
+        let channel = &of.channels[array.channel];
+        let [nx, ny, nz] = array.dims.map(|n| n as u64);
         let mut header = Header::default();
         let element = Element::of(channel.kind);
         match held {
@@ -151,6 +203,10 @@ fn headers(of: &Description, held: &Held, places: &Places) -> Vec<Vec<u8>> {
             }
         }
         header.attribute("meaning", &Attribute::Text(&channel.meaning));
+        if array.has_last {
+            let first = of.lattice(channel).first;
+            header.attribute("first", &Attribute::Floats(&first));
+        }
         if let Some(unit) = &channel.unit {
             header.attribute("units", &Attribute::Text(unit));
         }

@@ -52,6 +52,9 @@ pub struct ChannelSpec {
     pub meaning: String,
     /// Unit of the samples, where they have one.
     pub unit: Option<String>,
+    /// The axis across which the samples are those of sides, of which there is one more along it; formats whose arrays
+    /// may have their own shape hold the last of them, too.
+    pub staggered: Option<usize>,
 }
 
 impl ChannelSpec {
@@ -76,6 +79,7 @@ impl ChannelSpec {
             kind,
             meaning,
             unit: known.and_then(|channel| channel.unit().label(units)),
+            staggered: known.and_then(Channel::staggered),
         }
     }
 
@@ -310,6 +314,20 @@ impl StackWriter {
     /// [`IoError::Exr`] when the layer is not one of the stack's, [`IoError::Write`] when the
     /// system refuses.
     pub fn write_layer(&self, k: usize, layer: &[(&str, Samples<'_>)]) -> Result<(), IoError> {
+        self.write_layer_with_last(k, layer, &[])
+    }
+
+    /// As [`write_layer`](Self::write_layer), with what staggered channels have beyond the last voxel, by name: across x a
+    /// sample for each row, across y one for each column, across z a layer of them with the last layer.
+    ///
+    /// # Errors
+    /// As [`write_layer`](Self::write_layer), and [`IoError::Mismatch`] where samples are missing.
+    pub fn write_layer_with_last(
+        &self,
+        k: usize,
+        layer: &[(&str, Samples<'_>)],
+        last: &[(&str, &[f32])],
+    ) -> Result<(), IoError> {
         let [nx, ny, layers] = self.of.grid.dims();
         let directory = self.place.path();
         if k >= layers {
@@ -337,9 +355,11 @@ impl StackWriter {
             }
             Ok(())
         };
+        let last = self.pick_last(k, last).map_err(mismatch)?;
         let layer = Layer {
             k,
             channels: &samples,
+            last: &last,
             watch: &watch,
         };
         if !self.written().begun.insert(k) {
@@ -368,6 +388,35 @@ impl StackWriter {
         }
         self.written().layers.insert(k, statistics.into_inner());
         Ok(())
+    }
+
+    /// What each channel has beyond the last voxel of layer `k`, or why it is not that.
+    fn pick_last<'a>(
+        &self,
+        k: usize,
+        last: &[(&str, &'a [f32])],
+    ) -> Result<Vec<&'a [f32]>, String> {
+        let [nx, ny, nz] = self.of.grid.dims();
+        let is_wanted = self.kinds.iter().any(FormatKind::is_staggered);
+        let one = |channel: &ChannelSpec| {
+            let wanted = match channel.staggered {
+                Some(0) => ny,
+                Some(1) => nx,
+                Some(_) if k + 1 == nz => nx * ny,
+                _ => 0,
+            };
+            let found = last.iter().find(|one| one.0 == channel.name);
+            let found = found.map_or(&[][..], |one| one.1);
+            if is_wanted && found.len() != wanted {
+                return Err(format!(
+                    "channel {:?} has {} samples beyond the last voxel, and {wanted} are needed",
+                    channel.name,
+                    found.len()
+                ));
+            }
+            Ok(found)
+        };
+        self.of.channels.iter().map(one).collect()
     }
 
     /// What is named where layer `k` is wrong.

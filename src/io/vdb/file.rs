@@ -176,7 +176,7 @@ pub(super) fn grid<W: Write>(
 
 /// Where index (0, 0, 0) is, and how far the next are.
 fn transform(out: &mut impl Write, of: &Description) -> io::Result<()> {
-    let lattice = of.lattice();
+    let lattice = of.centres();
     let [dx, dy, dz] = lattice.spacing;
     let same = dx.to_bits() == dy.to_bits() && dy.to_bits() == dz.to_bits();
     text(

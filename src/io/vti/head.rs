@@ -18,7 +18,7 @@ pub(super) enum Held {
 
 /// What stands before the element of the first array.
 pub(super) fn begin(of: &Description, held: Held, points: bool) -> String {
-    let lattice = of.lattice();
+    let lattice = of.centres();
     let (origin, less) = if points {
         (lattice.first, 1)
     } else {

@@ -24,7 +24,8 @@ use super::nrrd;
 use super::staged::StagedFiles;
 
 pub(super) fn needs(of: &Description, encoding: VtiEncoding, _points: bool) -> Needs {
-    let (arrays, count) = (of.array_bytes(), of.channels.len() as u64);
+    let count = of.channels.len() as u64;
+    let arrays = of.voxel_bytes();
     let heads = SMALL.saturating_mul(count + 1);
     let layers = of.grid.dims()[2] as u64;
     let largest = of.channels.iter().map(|c| of.layer_bytes(c) as u64).max();

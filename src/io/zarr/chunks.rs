@@ -19,7 +19,7 @@ pub(super) struct Chunks {
 
 impl Chunks {
     pub(super) fn of(of: &Description, channel: &ChannelSpec) -> Self {
-        let dims = of.lattice().dims;
+        let dims = of.lattice(channel).dims;
         let [nx, ny, nz] = dims;
         let [most_z, most_y, most_x] = MOST;
         // As many as need be, and all as large as each other but for one sample.

@@ -7,8 +7,58 @@ use super::shard::LEVEL;
 use crate::io::format::{Description, Element, ZarrCodec};
 use crate::io::stack::ChannelSpec;
 
-/// Coordinate arrays: the axis of the grid, and the name.
-pub(super) const AXES: [(usize, &str); 3] = [(2, "z"), (1, "y"), (0, "x")];
+/// A coordinate array: of voxel centres, or of the sides of voxels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Axis {
+    axis: usize,
+    pub(super) name: &'static str,
+    of_sides: bool,
+}
+
+const CENTRES: [&str; 3] = ["x", "y", "z"];
+const SIDES: [&str; 3] = ["x_face", "y_face", "z_face"];
+
+impl Axis {
+    fn count(self, of: &Description) -> usize {
+        of.grid.dims()[self.axis] + usize::from(self.of_sides)
+    }
+
+    /// Where the samples are along it.
+    pub(super) fn places(self, of: &Description) -> impl Iterator<Item = f64> {
+        (0..self.count(of)).map(move |n| {
+            if self.of_sides {
+                of.grid.side_along(self.axis, n)
+            } else {
+                of.grid.centre_along(self.axis, n)
+            }
+        })
+    }
+}
+
+/// The coordinate arrays that the channels have.
+pub(super) fn axes(of: &Description) -> Vec<Axis> {
+    let has_sides = |axis| of.channels.iter().any(|c| c.staggered == Some(axis));
+    let one = |axis: usize, of_sides: bool| Axis {
+        axis,
+        name: if of_sides { SIDES[axis] } else { CENTRES[axis] },
+        of_sides,
+    };
+    let centres = (0..3).rev().map(|axis| one(axis, false));
+    let sides = (0..3).rev().filter(|axis| has_sides(*axis));
+    centres.chain(sides.map(|axis| one(axis, true))).collect()
+}
+
+/// The names of the dimensions of a channel's array.
+fn dimensions(channel: &ChannelSpec) -> [&'static str; 3] {
+    let name = |axis| {
+        if channel.staggered == Some(axis) {
+            SIDES[axis]
+        } else {
+            CENTRES[axis]
+        }
+    };
+    [name(2), name(1), name(0)]
+}
 
 /// The name of a channel's array.
 pub(super) fn folder(channel: &ChannelSpec) -> String {
@@ -26,7 +76,9 @@ pub(super) fn folder(channel: &ChannelSpec) -> String {
 
 /// The arrays by name, with their metadata.
 pub(super) fn nodes(of: &Description, codec: ZarrCodec) -> Vec<(String, Value)> {
-    let axes = AXES.map(|(axis, name)| (name.to_owned(), coordinate(of, axis, name)));
+    let axes = axes(of)
+        .into_iter()
+        .map(|axis| (axis.name.to_owned(), coordinate(of, axis)));
     let channels = of.channels.iter();
     let channels = channels.map(|channel| (folder(channel), array(of, channel, codec)));
     channels.chain(axes).collect()
@@ -69,13 +121,13 @@ fn multiscales(of: &Description) -> Vec<Value> {
         "m" => Some("meter"),
         _ => None,
     };
-    let lattice = of.lattice();
     let zyx = |[x, y, z]: [f64; 3]| [z, y, x];
     let axis = |name: &str| match unit {
         Some(unit) => json!({ "name": name, "type": "space", "unit": unit }),
         None => json!({ "name": name, "type": "space" }),
     };
     let one = |channel: &ChannelSpec| {
+        let lattice = of.lattice(channel);
         json!({
             "name": channel.name,
             "axes": [axis("z"), axis("y"), axis("x")],
@@ -125,13 +177,18 @@ fn array(of: &Description, channel: &ChannelSpec, codec: ZarrCodec) -> Value {
             },
         }],
         "attributes": attributes(&channel.meaning, channel.unit.as_deref()),
-        "dimension_names": ["z", "y", "x"],
+        "dimension_names": dimensions(channel),
     })
 }
 
-fn coordinate(of: &Description, axis: usize, name: &str) -> Value {
-    let count = of.grid.dims()[axis];
-    let meaning = format!("{name} of the voxel centres");
+fn coordinate(of: &Description, axis: Axis) -> Value {
+    let (count, name) = (axis.count(of), axis.name);
+    let what = if axis.of_sides {
+        "voxels' sides"
+    } else {
+        "voxel centres"
+    };
+    let meaning = format!("{} of the {what}", CENTRES[axis.axis]);
     json!({
         "zarr_format": 3,
         "node_type": "array",

@@ -20,8 +20,7 @@ mod shard;
 
 use super::error::IoError;
 use super::format::{
-    BUFFER, Description, Format, Layer, Needs, SMALL, ZarrCodec, digest_bytes, little_endian,
-    record,
+    BUFFER, Description, Format, Layer, Needs, SMALL, ZarrCodec, digest_bytes, record,
 };
 use super::manifest::FileRecord;
 use super::staged::{StagedFiles, WrittenFile};
@@ -40,7 +39,12 @@ pub(super) fn needs(of: &Description, codec: ZarrCodec) -> Needs {
         shards += 4 * chunks.shard_bytes();
         chunk = chunk.max(chunks.chunk_bytes() as u64);
     }
-    let axes: u64 = of.grid.dims().iter().map(|n| SMALL + 8 * *n as u64).sum();
+    let axes: u64 = of
+        .grid
+        .dims()
+        .iter()
+        .map(|n| 2 * (SMALL + 8 + 8 * *n as u64))
+        .sum();
     let small = small + axes + SMALL * (of.channels.len() as u64 + 1);
     let tiles = of.channels.iter().map(|c| of.layer_bytes(c) as u64).max();
     let tiles = 2 * tiles.unwrap_or(0);
@@ -66,6 +70,7 @@ pub(super) fn needs(of: &Description, codec: ZarrCodec) -> Needs {
 pub(super) struct Group {
     /// What is written at once.
     small: Vec<(String, WrittenFile)>,
+    of: Description,
     arrays: Vec<ShardedArray>,
 }
 
@@ -90,11 +95,9 @@ impl Group {
         for (name, node) in &nodes {
             write(format!("{name}/zarr.json"), &metadata::text(node))?;
         }
-        for (axis, name) in metadata::AXES {
-            let count = of.grid.dims()[axis];
-            let centres = (0..count).map(|n| of.grid.centre_along(axis, n));
-            let bytes: Vec<u8> = centres.flat_map(f64::to_le_bytes).collect();
-            write(format!("{name}/c.0"), &bytes)?;
+        for axis in metadata::axes(of) {
+            let bytes: Vec<u8> = axis.places(of).flat_map(f64::to_le_bytes).collect();
+            write(format!("{}/c.0", axis.name), &bytes)?;
         }
         let arrays = of.channels.iter().map(|channel| {
             let place = format!("{root}/{}", metadata::folder(channel));
@@ -102,6 +105,7 @@ impl Group {
         });
         Ok(Self {
             arrays: arrays.collect::<Result<_, _>>()?,
+            of: of.clone(),
             small,
         })
     }
@@ -109,8 +113,10 @@ impl Group {
 
 impl Format for Group {
     fn layer(&self, files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
-        for (array, (_, samples)) in self.arrays.iter().zip(layer.channels) {
-            array.layer(files, layer.k, &little_endian(samples))?;
+        for (channel, array) in self.arrays.iter().enumerate() {
+            for (k, bytes) in layer.parts(&self.of, channel) {
+                array.layer(files, k, &bytes)?;
+            }
         }
         Ok(())
     }
