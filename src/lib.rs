@@ -105,6 +105,7 @@ pub mod converge;
 pub mod error;
 pub mod exchange;
 pub mod grid;
+pub mod guide;
 pub mod io;
 pub mod math;
 pub mod mesh;

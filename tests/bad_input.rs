@@ -391,8 +391,8 @@ fn solids_and_grids_are_checked() {
     );
     refused(&output("band = 0"), &["s.toml:7:8", "0"]);
     refused(
-        &output("formats = [\"vdb\"]"),
-        &["s.toml:7:12", "vdb", "exr"],
+        &output("formats = [\"vdp\"]"),
+        &["s.toml:7:12", "vdp", "exr", "did you mean `vdb`"],
     );
     refused(
         &output("compression = \"dwa\""),

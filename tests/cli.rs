@@ -166,7 +166,7 @@ fn exit_codes_tell_usage_input_and_files_apart() {
             2,
             &["voxelize", &torus, "-o", &out, "--channels", "sdf,sdf"],
         ),
-        (2, &["voxelize", &torus, "-o", &out, "--formats", "vdb"]),
+        (2, &["voxelize", &torus, "-o", &out, "--formats", "vtk"]),
         (
             2,
             &["voxelize", &torus, "-o", &out, "--compression", "dwaa"],

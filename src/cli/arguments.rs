@@ -126,15 +126,19 @@ pub(super) enum Command {
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
-DIR/slice-0000.exr ... hold one z layer each: column = x, row = y, row 0 is the smallest y. Files appear under
-their final names only when all are whole; DIR/manifest.json comes last.
+DIR/slice-0000.exr ... hold one z layer each: column = x, row = y, row 0 is the smallest y. The other formats are one
+file for each channel (npy, nrrd, mhd, raw) or for all (vti, zarr, h5, vdb). Files appear under their final names only
+when all are whole; DIR/manifest.json comes last. An output that ends in .vti, .nrrd, .npy, .h5, .vdb or .zarr is that
+one file, without a manifest.
 
-Example: voxlathe voxelize scenes/torus.toml -o out/torus --channels occupancy,sdf --band 3")]
+Examples: voxlathe voxelize scenes/torus.toml -o out/torus --channels occupancy,sdf --band 3
+          voxlathe voxelize scenes/torus.toml -o out/torus --formats vti,zarr,vdb
+          voxlathe voxelize scenes/torus.toml -o torus.vti")]
 pub(super) struct Voxelize {
     /// The scene: TOML, JSON by its ending, or - for TOML on standard input
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
-    /// Directory to write
+    /// Directory to write, or one file: .vti, .nrrd, .npy, .h5, .vdb or .zarr
     #[arg(long, short, value_name = "DIR")]
     pub(super) output: PathBuf,
     #[command(flatten)]
@@ -142,12 +146,30 @@ pub(super) struct Voxelize {
     /// What to sample: occupancy, fraction, sdf, material
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(super) channels: Vec<String>,
-    /// Formats to write: exr
+    /// Formats to write: exr, vti, npy, nrrd, mhd, raw, zarr, vdb, h5
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     pub(super) formats: Vec<String>,
-    /// none, rle, zips, zip, piz, pxr24 (24-bit floats: lossy) or auto
+    /// Of exr: none, rle, zips, zip, piz, pxr24 (24-bit floats: lossy) or auto
     #[arg(long, value_name = "KIND")]
     pub(super) compression: Option<String>,
+    /// How .vti files hold their arrays
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub(super) vti_encoding: VtiFlag,
+    /// Give .vti files values at points, the voxel centres, instead of cells
+    #[arg(long)]
+    pub(super) vti_points: bool,
+    /// How .nrrd files hold their array
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub(super) nrrd_encoding: NrrdFlag,
+    /// How .zarr chunks are compressed
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub(super) zarr_codec: ZarrFlag,
+    /// How .h5 arrays are compressed
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub(super) h5_codec: H5Flag,
+    /// Of all but occupancy and material, in npy, nrrd, mhd, raw, vti, zarr and h5
+    #[arg(long, value_name = "TYPE", value_enum, default_value_t)]
+    pub(super) precision: Precision,
     /// Clamp distances to this many voxels on both sides of the surface
     #[arg(long, value_name = "VOXELS", allow_negative_numbers = true)]
     pub(super) band: Option<f64>,
@@ -157,7 +179,7 @@ pub(super) struct Voxelize {
     /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(super) memory_limit: Option<u64>,
-    /// Replace the stack in DIR: exactly the files its manifest lists, and stale slices
+    /// Replace the stack in DIR: exactly the files its manifest lists, and stale slices; or the one file
     #[arg(long)]
     pub(super) force: bool,
     /// Say what would be written, and write nothing
@@ -166,6 +188,53 @@ pub(super) struct Voxelize {
     /// Draw preview.png, the solid, and preview-slices.png, nine of the slices, beside the stack
     #[arg(long)]
     pub(super) preview: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum VtiFlag {
+    /// Appended as they are
+    #[default]
+    Raw,
+    /// Appended in blocks of deflate
+    Zlib,
+    /// In the XML itself, for readers that take no appended data
+    Base64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum NrrdFlag {
+    /// As it is
+    #[default]
+    Raw,
+    /// As a gzip stream
+    Gzip,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum ZarrFlag {
+    /// Not at all
+    #[default]
+    None,
+    /// Zstandard
+    Zstd,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum H5Flag {
+    /// Not at all
+    #[default]
+    None,
+    /// Deflate; needs the feature hdf5
+    Gzip,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum Precision {
+    /// 32-bit floats
+    #[default]
+    F32,
+    /// 64-bit floats
+    F64,
 }
 
 /// Flags in place of the scene's resolution, spacing, origin and dims; its bounds stay.
@@ -428,6 +497,9 @@ pub(super) struct Info {
     /// Directory of a finished stack
     #[arg(value_name = "DIR")]
     pub(super) directory: PathBuf,
+    /// Print a line for each file: its size, digest and name
+    #[arg(long)]
+    pub(super) files: bool,
 }
 
 #[derive(Debug, Args)]

@@ -20,7 +20,7 @@ pub(super) fn run(
     let m = &report.manifest;
     let total: u64 = m.files.iter().map(|f| f.bytes).sum();
     let altered: Vec<&str> = report.altered.iter().map(|a| a.name.as_str()).collect();
-    let document = json!({
+    let mut document = json!({
         "directory": output::path(&arguments.directory),
         "scene": m.scene_name,
         "scene_hash": m.scene_hash,
@@ -31,6 +31,7 @@ pub(super) fn run(
         "units": m.units,
         "bounds": m.bounds,
         "channels": m.channels,
+        "formats": m.formats,
         "compression": m.compression,
         "files": m.files.len(),
         "bytes": total,
@@ -50,7 +51,16 @@ pub(super) fn run(
         "extra": report.extra,
         "ok": report.is_intact(),
     });
+    if arguments.files {
+        document["listing"] = json!(m.files);
+    }
     let mut text = holdings(m);
+    if arguments.files {
+        let listed = m.files.iter();
+        text.extend(
+            listed.map(|f| format!("file         {:>12} {} {}\n", f.bytes, f.blake3, f.name)),
+        );
+    }
     let damaged = report.missing.iter().map(|n| format!("missing      {n}\n"));
     let damaged = damaged.chain(altered.iter().map(|n| format!("altered      {n}\n")));
     let wrong = report.wrong.iter().take(SHOWN);
@@ -148,7 +158,10 @@ fn holdings(m: &Manifest) -> String {
     }
     let total: u64 = m.files.iter().map(|f| f.bytes).sum();
     let files = format!("{}, {}", m.files.len(), output::bytes(total));
-    line("files", format!("{files}, {}", m.compression));
+    let formats = m.formats.join(", ");
+    let compression = m.compression.as_deref();
+    let compression = compression.map_or_else(String::new, |c| format!(", {c}"));
+    line("files", format!("{files}, {formats}{compression}"));
     lines
         .iter()
         .map(|[name, value]| format!("{name:<12} {value}\n"))

@@ -7,6 +7,7 @@ mod bench;
 mod converge;
 mod export;
 mod failure;
+mod formats;
 mod generate;
 mod info;
 mod interrupt;

@@ -14,7 +14,6 @@
 
 use crate::error::Error;
 use crate::io::available_bytes;
-use crate::io::exr::Compression;
 use crate::io::stack::StackWriter;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -59,16 +58,13 @@ enum Known {
 
 impl Forecast {
     /// Of a stack of so many layers; `exact` is what it takes where that is known.
-    pub(super) fn new(
-        layers: usize,
-        compression: Compression,
-        beside: u64,
-        exact: Option<u64>,
-    ) -> Self {
-        let (order, ends) = if compression == Compression::None {
-            ((0..layers).collect(), Vec::new())
-        } else {
+    ///
+    /// * `in_stages`: whether the layers that are written tell what the others take.
+    pub(super) fn new(layers: usize, in_stages: bool, beside: u64, exact: Option<u64>) -> Self {
+        let (order, ends) = if in_stages {
             stages(layers)
+        } else {
+            ((0..layers).collect(), Vec::new())
         };
         let starts = std::iter::once(0).chain(ends.iter().copied());
         let stages = (starts.zip(&ends))

@@ -2,6 +2,7 @@
 
 use super::arguments::{Common, Voxelize};
 use super::failure::Failure;
+use super::formats::{self, Formats};
 use super::interrupt;
 use super::memory::{self, Budget, Need};
 use super::output::{self, Console, NOTHING_LEFT, VOLUME_NOT_MEASURED};
@@ -10,10 +11,10 @@ use crate::error::Error;
 use crate::grid::{Channel, GridSpec};
 use crate::io::IoError;
 use crate::io::exr::{Compression, SampleKind, Samples};
+use crate::io::format::{Description, FormatKind};
 use crate::io::manifest::{Manifest, MaterialVolume};
 use crate::io::stack::{
     ChannelSpec, SceneLabel, StackOptions, StackSpace, StackSummary, StackWriter,
-    largest_slice_bytes,
 };
 use crate::math::Kernel;
 use crate::math::quadrature::Integral;
@@ -38,7 +39,7 @@ struct Plan {
     /// Materials whose shares are channels.
     materials: Vec<u32>,
     channels: Vec<ChannelSpec>,
-    compression: Compression,
+    formats: Formats,
     budget: Budget,
     /// Bytes that the records of all layers, and the previews, take.
     fixed_bytes: u64,
@@ -99,17 +100,16 @@ pub(super) fn run(
     if let Some(warning) = scene.grid_warning(&plan.grid) {
         console.warn(&warning);
     }
+    if let Some(warning) = plan.formats.warning(&plan.grid, &plan.channels) {
+        console.warn(&warning);
+    }
     let prepare = start.elapsed().as_secs_f64();
     tracing::debug!(dims = ?plan.grid.dims(), workers = plan.workers, layer_bytes = plan.layer_bytes, "planned");
     if arguments.dry_run {
         return dry_run(&scene, &plan, arguments, prepare, console);
     }
-    let writer = StackWriter::create(
-        &arguments.output,
-        &plan.grid,
-        plan.channels.clone(),
-        stack_options(&scene, arguments, plan.compression),
-    )?;
+    let options = stack_options(&scene, arguments, plan.formats.kinds.clone());
+    let writer = writer(&plan, arguments, options)?;
     let drawn = Instant::now();
     if arguments.preview {
         // First, so that what they take is known.
@@ -173,6 +173,20 @@ pub(super) fn run(
     Ok(ExitCode::SUCCESS)
 }
 
+/// The writer of a directory, or of one file.
+fn writer(
+    plan: &Plan,
+    arguments: &Voxelize,
+    options: StackOptions,
+) -> Result<StackWriter, IoError> {
+    let (path, channels) = (&arguments.output, plan.channels.clone());
+    if plan.formats.is_single {
+        let kind = plan.formats.kinds[0];
+        return StackWriter::create_single(path, &plan.grid, channels, kind, options);
+    }
+    StackWriter::create(path, &plan.grid, channels, options)
+}
+
 /// Puts the command's flags in place of the scene's own choices.
 fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
     fn names<T: Copy + PartialEq>(
@@ -201,6 +215,7 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         Ok(chosen)
     }
     let channels = channels(scene, &arguments.channels)?;
+    let single = formats::single(arguments)?;
     let (grid, output) = scene.model_mut();
     arguments.step.apply(grid)?;
     if !channels.is_empty() {
@@ -213,7 +228,9 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
         FormatName::name,
         FormatName::from_name,
     )?;
-    if !formats.is_empty() {
+    if let Some(format) = single {
+        output.formats = vec![format];
+    } else if !formats.is_empty() {
         output.formats = formats;
     }
     let compression: Vec<String> = arguments.compression.iter().cloned().collect();
@@ -290,16 +307,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
     if selection.has(Channel::Sdf) {
         check_f32_range(scene, &grid)?;
     }
-    let compression = match output.compression {
-        CompressionName::Auto => Compression::Auto,
-        CompressionName::None => Compression::None,
-        CompressionName::Rle => Compression::Rle,
-        CompressionName::Zips => Compression::Zips,
-        CompressionName::Zip => Compression::Zip,
-        CompressionName::Piz => Compression::Piz,
-        CompressionName::Pxr24 => Compression::Pxr24,
-    };
-    let compression = compression.resolve(output.channels.iter().map(|c| c.name()));
+    let formats = Formats::of(scene, arguments, &grid, &channels)?;
     let sampled =
         LayerSampler::bytes_per_layer(scene.assembly(), &grid, &selection).saturating_add(
             LayerSampler::bytes_of_division(scene.assembly(), &selection),
@@ -310,17 +318,8 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         .saturating_add(4 * grid.layer_len() as u64)
         .saturating_mul(materials.len() as u64);
     let sampled = sampled.saturating_add(of_material);
-    let layer_bytes = layer_bytes(&grid, sampled, &channels, scalars.len(), compression);
-    let (stated, resolved) = (
-        summary(scene, &selection, &grid, None),
-        |to: &mut dyn std::io::Write| scene.model().write_resolved_indented(to),
-    );
-    let options = stack_options(scene, arguments, compression);
-    let space = StackSpace::new(&grid, &channels, &options, stated, &resolved);
-    let space = space.map_err(|error| IoError::Exr {
-        path: arguments.output.clone(),
-        error,
-    })?;
+    let layer_bytes = layer_bytes(&grid, sampled, scalars.len(), &formats);
+    let space = space(scene, arguments, &grid, (&selection, &channels), &formats)?;
     let plan = Plan {
         grid,
         selection,
@@ -328,13 +327,14 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         scalars,
         materials,
         channels,
-        compression,
         budget: Budget::new(arguments.memory_limit),
-        fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview),
+        fixed_bytes: fixed_bytes(&grid, output.channels.len(), arguments.preview)
+            .saturating_add(formats.needs.memory),
         layer_bytes,
         workers: 1,
         space,
-        expected_bytes: (compression == Compression::None).then_some(space.uncompressed()),
+        expected_bytes: formats.needs.disk_is_sure.then_some(space.uncompressed()),
+        formats,
     };
     // What is too large without its tables is not worth making them.
     plan.room()?;
@@ -342,27 +342,55 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
     Ok(plan)
 }
 
-fn stack_options(scene: &Scene, arguments: &Voxelize, compression: Compression) -> StackOptions {
+fn stack_options(scene: &Scene, arguments: &Voxelize, formats: Vec<FormatKind>) -> StackOptions {
     StackOptions {
         units: scene.model().units.name().to_owned(),
         scene: Some(SceneLabel {
             name: scene.name().to_owned(),
             hash: scene.hash(),
         }),
-        compression,
+        formats,
         force: arguments.force,
     }
+}
+
+/// What the output takes on its disk, as far as that is known beforehand.
+fn space(
+    scene: &Scene,
+    arguments: &Voxelize,
+    grid: &GridSpec,
+    (selection, channels): (&Selection, &[ChannelSpec]),
+    formats: &Formats,
+) -> Result<StackSpace, Failure> {
+    let (stated, resolved) = (
+        summary(scene, selection, grid, None),
+        |to: &mut dyn std::io::Write| scene.model().write_resolved_indented(to),
+    );
+    let options = stack_options(scene, arguments, formats.kinds.clone());
+    let of = Description {
+        grid: *grid,
+        units: options.units,
+        scene: options.scene,
+        channels: channels.to_vec(),
+        file: None,
+    };
+    let space = StackSpace::new(&of, &formats.kinds, stated, &resolved);
+    let space = space.map_err(|error| IoError::Exr {
+        path: arguments.output.clone(),
+        error,
+    })?;
+    // One file has no manifest.
+    let beside = if formats.is_single { 0 } else { space.beside };
+    Ok(StackSpace { beside, ..space })
 }
 
 /// Bytes that the stack takes at least: all, or where they are compressed what remains of the samples at best; what does
 /// is told by the layers that are made first.
 fn least_bytes(plan: &Plan) -> u64 {
-    /// The best ratio deflate reaches, on a constant layer.
-    const BEST: u64 = 1000;
-    if plan.compression == Compression::None {
+    if plan.formats.needs.disk_is_sure {
         plan.space.uncompressed()
     } else {
-        (plan.space.slices / BEST).saturating_add(plan.space.beside)
+        plan.formats.least.saturating_add(plan.space.beside)
     }
 }
 
@@ -398,25 +426,12 @@ fn fixed_bytes(grid: &GridSpec, channels: usize, preview: bool) -> u64 {
     records.saturating_add(if preview { PREVIEW } else { 0 })
 }
 
-/// Memory that a worker takes: the samples of one layer, `sampled` bytes but for scalars, their EXR form and what makes
-/// it.
-fn layer_bytes(
-    grid: &GridSpec,
-    sampled: u64,
-    channels: &[ChannelSpec],
-    scalars: usize,
-    compression: Compression,
-) -> u64 {
+/// Memory that a worker takes: the samples of one layer, `sampled` bytes but for scalars, and what makes files of it.
+fn layer_bytes(grid: &GridSpec, sampled: u64, scalars: usize, formats: &Formats) -> u64 {
     let scalars = 4 * (grid.layer_len() as u64).saturating_mul(scalars as u64);
-    // A compressed file grows as it comes, to at most twice its size, and is copied as it grows.
-    let copies = if compression == Compression::None {
-        1
-    } else {
-        3
-    };
     sampled
         .saturating_add(scalars)
-        .saturating_add(largest_slice_bytes(grid, channels).saturating_mul(copies))
+        .saturating_add(formats.needs.each)
 }
 
 fn channel(model: &ChannelModel) -> Option<Channel> {
@@ -503,8 +518,9 @@ fn stream(
 ) -> Result<Streamed, Failure> {
     let workers = plan.workers;
     let layers = plan.grid.dims()[2];
-    let (compression, beside) = (plan.compression, plan.space.beside);
-    let forecast = Forecast::new(layers, compression, beside, plan.expected_bytes);
+    let beside = plan.space.beside;
+    let in_stages = plan.formats.are_compressed_slices();
+    let forecast = Forecast::new(layers, in_stages, beside, plan.expected_bytes);
     let bar = console.bar(layers as u64, "layers");
     let next = AtomicUsize::new(0);
     let failed = AtomicBool::new(false);
@@ -518,7 +534,9 @@ fn stream(
         // An interrupted layer is not whole.
         interrupt::check()?;
         let sampled = Instant::now();
-        writer.write_layer(k, &layer(&plan.channels, buffers))?;
+        let last = buffers.last_sides.iter();
+        let last: Vec<(&str, &[f32])> = last.map(|(c, values)| (c.name(), &values[..])).collect();
+        writer.write_layer_with_last(k, &layer(&plan.channels, buffers), &last)?;
         let mut all = tally.lock().unwrap_or_else(PoisonError::into_inner);
         all.0.add(&buffers.tally);
         all.1[k] = buffers.fraction_sum;
@@ -819,7 +837,8 @@ fn document(
         "units": scene.model().units.name(),
         "bounds": [scene.bounds().min.to_array(), scene.bounds().max.to_array()],
         "channels": names,
-        "compression": plan.compression.name(),
+        "formats": plan.formats.names(),
+        "compression": plan.formats.compression().map(Compression::name),
         "files": manifest.map(|m| m.files.iter().map(|f| f.name.as_str()).collect::<Vec<_>>()),
         "bytes": manifest.map(|m| m.files.iter().map(|f| f.bytes).sum::<u64>()),
         "bytes_uncompressed": plan.space.uncompressed(),
@@ -853,9 +872,10 @@ fn dry_run(
     let [nx, ny, nz] = plan.grid.dims();
     let names: Vec<&str> = plan.channels.iter().map(|c| c.name.as_str()).collect();
     let text = format!(
-        "would write {nz} slices of {nx} x {ny} voxels ({}) to {}\nat most {} on disk{}, {} of memory for {} layers at a time\n",
+        "would write {nz} slices of {nx} x {ny} voxels ({}) to {} as {}\nat most {} on disk{}, {} of memory for {} layers at a time\n",
         names.join(", "),
         arguments.output.display(),
+        plan.formats.names().join(", "),
         output::bytes(plan.space.uncompressed()),
         if arguments.preview {
             " and the previews"

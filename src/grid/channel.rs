@@ -211,6 +211,17 @@ impl Channel {
         self.entry().range.clone()
     }
 
+    /// The axis across which its samples are those of sides and not of voxels: there is one more of them along it.
+    #[must_use]
+    pub fn staggered(self) -> Option<usize> {
+        match self {
+            Self::FaceX => Some(0),
+            Self::FaceY => Some(1),
+            Self::FaceZ => Some(2),
+            _ => None,
+        }
+    }
+
     /// Whether runs of equal samples fill most of a layer.
     #[must_use]
     pub fn is_mostly_constant(self) -> bool {

@@ -140,6 +140,15 @@ impl GridSpec {
         self.origin[axis] + steps * self.spacing[axis]
     }
 
+    /// Coordinate along `axis` (0, 1, 2) of the lower side of the voxels with that `index`; there is one side more than
+    /// voxels.
+    #[must_use]
+    pub fn side_along(&self, axis: usize, index: usize) -> f64 {
+        #[allow(clippy::cast_precision_loss, reason = "dimensions are below 2^31")]
+        let steps = index as f64;
+        self.origin[axis] + steps * self.spacing[axis]
+    }
+
     /// Centre of voxel (i, j, k), in scene units.
     ///
     /// ```

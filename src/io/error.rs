@@ -54,6 +54,20 @@ pub enum IoError {
         /// The file in the way.
         path: PathBuf,
     },
+    /// A file that is to be written is there already.
+    #[error("{} exists; choose another name, or give --force to replace it", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What is to be replaced is something else than what comes.
+    #[error("{} exists and is no {wanted}, so it is not replaced; move it away, or choose another name", path.display())]
+    Other {
+        /// The path asked for.
+        path: PathBuf,
+        /// What it would have to be.
+        wanted: &'static str,
+    },
     /// A file that is to be replaced is not the one that was written.
     #[error("{} has been changed since it was written, so it is not replaced; move it away, or choose another output directory", path.display())]
     Edited {
@@ -88,6 +102,27 @@ pub enum IoError {
     WrittenTwice {
         /// The file.
         path: PathBuf,
+    },
+    /// Two files would have one name where case does not count.
+    #[error(
+        "{}: the files {name:?} and {other:?} have the same name where case does not count; rename a channel or the scene",
+        path.display()
+    )]
+    Clash {
+        /// The directory.
+        path: PathBuf,
+        /// The name of the second.
+        name: String,
+        /// The name of the first.
+        other: String,
+    },
+    /// A layer was written twice.
+    #[error("{}: layer {layer} was written twice; write each layer once", path.display())]
+    LayerTwice {
+        /// The directory of the stack.
+        path: PathBuf,
+        /// The layer.
+        layer: usize,
     },
     /// A manifest is not one of ours, or damaged.
     #[error(

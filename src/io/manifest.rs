@@ -63,10 +63,13 @@ pub struct Manifest {
     pub grid: ManifestGrid,
     /// Minimum and maximum corner of the solid, in scene units.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// The channels of each slice.
+    /// The channels of each layer.
     pub channels: Vec<ChannelRecord>,
-    /// How the slices are compressed; `auto` is resolved.
-    pub compression: String,
+    /// The formats of the files, in the order that was asked for; stacks of earlier programs have slices alone.
+    #[serde(default = "slices_alone")]
+    pub formats: Vec<String>,
+    /// How the slices are compressed, where there are any; `auto` is resolved.
+    pub compression: Option<String>,
     /// Every file of the stack but the manifest.
     pub files: Vec<FileRecord>,
     /// Voxels whose centre is inside.
@@ -94,6 +97,10 @@ pub struct Manifest {
     pub certainty: serde_json::Value,
     /// The resolved scene.
     pub scene: serde_json::Value,
+}
+
+fn slices_alone() -> Vec<String> {
+    vec!["exr".into()]
 }
 
 /// What one material takes of a solid.
@@ -343,20 +350,32 @@ pub(super) fn is_slice_name(name: &str) -> bool {
         .is_some_and(|k| k.len() >= 4 && k.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// Whether `name` can only mean a file directly in a stack's directory.
+/// Whether `name` can only mean a file of a stack: one in its directory, or in a directory below, as `a/b`.
 pub(super) fn check_file_name(name: &str) -> Result<(), &'static str> {
     if name.is_empty() {
-        Err("is empty")
-    } else if name.len() > 255 {
-        Err("is longer than 255 bytes")
-    } else if name.contains(['/', '\\', ':']) {
+        return Err("is empty");
+    }
+    if name == MANIFEST_NAME {
+        return Err("is the manifest's own");
+    }
+    if name.split('/').count() > DEEPEST {
+        return Err("leads through too many directories");
+    }
+    name.split('/').try_for_each(check_part)
+}
+
+/// Directories that a name leads through, and the file, at most.
+const DEEPEST: usize = 8;
+
+fn check_part(part: &str) -> Result<(), &'static str> {
+    if part.is_empty() || part == ".." || part.contains(['\\', ':']) {
         Err("leads out of the directory")
-    } else if name.starts_with('.') {
+    } else if part.len() > 255 {
+        Err("is longer than 255 bytes")
+    } else if part.starts_with('.') {
         Err("starts with a dot")
-    } else if name.chars().any(char::is_control) {
+    } else if part.chars().any(char::is_control) {
         Err("has control characters")
-    } else if name == MANIFEST_NAME {
-        Err("is the manifest's own")
     } else {
         Ok(())
     }
@@ -534,7 +553,8 @@ pub(super) mod tests {
                 unit: Some("mm".into()),
                 range: Some([-1.5, 0.1]),
             }],
-            compression: "none".into(),
+            formats: vec!["exr".into()],
+            compression: Some("none".into()),
             files: vec![FileRecord {
                 name: "slice-0000.exr".into(),
                 slice: Some(0),
@@ -593,6 +613,7 @@ pub(super) mod tests {
                 "grid",
                 "bounds",
                 "channels",
+                "formats",
                 "compression",
                 "files",
                 "voxels_inside",

@@ -13,6 +13,7 @@
 //! Equal input gives equal bytes: no times, no random names, no map order reaches a file. A file
 //! appears under its final name only when it is whole and synced.
 
+mod deflate;
 pub mod directory;
 #[cfg_attr(
     not(feature = "cli"),
@@ -21,17 +22,28 @@ pub mod directory;
 pub(crate) mod ending;
 mod error;
 pub mod exr;
+pub mod format;
+mod grid_file;
+mod h5;
 pub(crate) mod leftovers;
 pub mod manifest;
 pub mod mesh;
+mod mhd;
+mod npy;
+mod nrrd;
+pub mod output;
 pub mod points;
+mod raw;
 mod regular;
-#[cfg(feature = "cli")]
 pub(crate) mod scratch;
 mod single;
 pub mod stack;
+pub mod staged;
 mod syncer;
+mod vdb;
 pub mod verify;
+mod vti;
+mod zarr;
 
 pub use directory::{StackDirectory, available_bytes};
 pub use error::{IoError, IoErrorKind};

@@ -57,7 +57,7 @@ pub fn write_file_atomically(
 }
 
 /// What the names of temporary files for `target` begin with: the same in each run, and short whatever its name.
-fn prefix(target: &Path) -> String {
+pub(super) fn prefix(target: &Path) -> String {
     let name = target.file_name().unwrap_or_default();
     let hash = blake3::hash(name.as_encoded_bytes()).to_hex();
     format!(".voxlathe-{}-", &hash[..16])

@@ -17,7 +17,7 @@ impl LayerSampler<'_> {
         if wanted.is_empty() {
             return;
         }
-        let [nx, ny, _] = self.grid.dims();
+        let [nx, ny, nz] = self.grid.dims();
         let sides = self.grid.spacing();
         let reach = reach(sides);
         let error = self.selection.fraction_error.unwrap_or(FRACTION_ERROR);
@@ -51,8 +51,31 @@ impl LayerSampler<'_> {
                         values[n] = value;
                     }
                 }
+                for (channel, values) in &mut out.last_sides {
+                    let (axis, place, is_last) = match channel {
+                        Channel::FaceX => (0, j, i + 1 == nx),
+                        Channel::FaceY => (1, i, j + 1 == ny),
+                        _ => (2, n, k + 1 == nz),
+                    };
+                    if is_last {
+                        values[place] = stored(cell.sides[axis][1]);
+                    }
+                }
             }
         }
+    }
+
+    /// Makes room for the shares of the last sides, where any are wanted.
+    pub(super) fn clear_last_sides(&self, k: usize, out: &mut Vec<(Channel, Vec<f32>)>) {
+        let [nx, ny, nz] = self.grid.dims();
+        let faces = [
+            (Channel::FaceX, ny),
+            (Channel::FaceY, nx),
+            (Channel::FaceZ, if k + 1 == nz { nx * ny } else { 0 }),
+        ];
+        out.clear();
+        let wanted = faces.into_iter().filter(|face| self.selection.has(face.0));
+        out.extend(wanted.map(|(channel, count)| (channel, vec![0.0; count])));
     }
 
     /// What of the composite's terms the surfaces near a voxel leave open; `None` where all of it is solid.
@@ -133,6 +156,11 @@ fn value(channel: Channel, cell: &CutCell) -> Option<f32> {
         Channel::BoundaryNormalZ => cell.normal.z,
         _ => return None,
     };
+    Some(stored(value))
+}
+
+/// A value as it is stored.
+fn stored(value: f64) -> f32 {
     #[allow(clippy::cast_possible_truncation, reason = "stored samples are f32")]
-    Some((value as f32).clamp(f32::MIN, f32::MAX))
+    (value as f32).clamp(f32::MIN, f32::MAX)
 }

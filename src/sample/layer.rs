@@ -77,6 +77,9 @@ pub struct LayerBuffers {
     pub material: Vec<u32>,
     /// The other quantities that are wanted, each a value for a voxel.
     pub others: Vec<(Channel, Vec<f32>)>,
+    /// Of the shares of sides that are wanted those of the upper sides of the grid's last voxels: across x one for each
+    /// row, across y one for each column, across z a layer of them, in the last layer alone.
+    pub last_sides: Vec<(Channel, Vec<f32>)>,
     /// The shares of materials that the sampler was given.
     pub material_fractions: Vec<Vec<f32>>,
     /// Scalars of volumes, one list for each that the sampler was given.
@@ -322,6 +325,7 @@ impl<'a> LayerSampler<'a> {
         if !out.others.iter().map(|o| o.0).eq(others.clone()) {
             out.others = others.map(|channel| (channel, Vec::new())).collect();
         }
+        self.clear_last_sides(k, &mut out.last_sides);
         for (_, values) in &mut out.others {
             // Not every voxel has all of them.
             values.clear();

@@ -102,6 +102,22 @@ named! {
     FormatName {
         /// A stack of OpenEXR images, one for each layer.
         Exr = "exr",
+        /// VTK image data.
+        Vti = "vti",
+        /// NumPy arrays.
+        Npy = "npy",
+        /// Nearly raw raster data.
+        Nrrd = "nrrd",
+        /// MetaImage headers with their raw arrays.
+        Mhd = "mhd",
+        /// Bare arrays.
+        Raw = "raw",
+        /// A Zarr v3 group.
+        Zarr = "zarr",
+        /// OpenVDB grids.
+        Vdb = "vdb",
+        /// HDF5.
+        H5 = "h5",
     }
 }
 

@@ -8,6 +8,7 @@ use crate::cli::interrupt;
 use crate::cli::output;
 use crate::grid::{Channel, GridSpec};
 use crate::io::exr::{Compression, LayerEncoder, Samples, decode_layer, layer_attributes};
+use crate::io::format::FormatKind;
 use crate::io::scratch::ScratchDirectory;
 use crate::io::stack::{ChannelSpec, StackOptions, StackSummary, StackWriter, largest_stack_bytes};
 use crate::io::{available_bytes, verify_stack};
@@ -174,7 +175,7 @@ impl Job<'_> {
         let stack = |folder: &ScratchDirectory| -> Result<Duration, Failure> {
             let begin = Instant::now();
             let options = StackOptions {
-                compression: Compression::None,
+                formats: vec![FormatKind::Exr(Compression::None)],
                 ..StackOptions::default()
             };
             let out = folder.path().join("stack");

@@ -11,7 +11,6 @@
 //! journal does the work.
 
 use std::collections::BTreeSet;
-use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
@@ -21,7 +20,7 @@ use rustix::fs::Access;
 
 use super::journal::{new_place, rename_onto_nothing};
 use super::staging::{STAGING, is_in_use};
-use super::{MANIFEST_NAME, sync_directory};
+use super::{MANIFEST_NAME, files_below, folders, sync_directory};
 use crate::io::error::IoError;
 use crate::io::manifest::{is_slice_name, listed_files};
 
@@ -204,24 +203,20 @@ pub(super) fn dismantle(old: &Path, home: &Path) -> io::Result<()> {
     } else {
         BTreeSet::new()
     };
-    let is_ours = |name: &OsString| {
-        name.to_str()
-            .is_some_and(|name| is_slice_name(name) || listed.contains(name))
-    };
-    let names: Vec<OsString> = fs::read_dir(old)?
-        .map(|entry| Ok(entry?.file_name()))
-        .collect::<io::Result<_>>()?;
-    for name in names {
+    let is_ours = |name: &str| is_slice_name(name) || listed.contains(name);
+    for name in files_below(old, listed.iter().map(String::as_str))? {
         let path = old.join(&name);
-        if name == MANIFEST_NAME || name == STAGING {
+        if name == Path::new(MANIFEST_NAME) || name == Path::new(STAGING) {
             continue;
         }
-        if is_ours(&name) && fs::symlink_metadata(&path)?.is_file() {
+        if name.to_str().is_some_and(is_ours) && fs::symlink_metadata(&path)?.is_file() {
             fs::remove_file(path)?;
         } else {
+            folders::make_for(home, &name)?;
             rename_onto_nothing(&path, &home.join(&name))?;
         }
     }
+    folders::prune(old, listed.iter().map(String::as_str));
     // Last, as they tell what the directory is.
     match fs::remove_file(manifest) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),

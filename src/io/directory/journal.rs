@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{MANIFEST_NAME, exists, sync_directory};
+use super::{MANIFEST_NAME, exists, folders, sync_directory};
 use crate::io::error::IoError;
 use crate::io::manifest::check_file_name;
 
@@ -142,6 +142,7 @@ impl Journal {
             // A new file that does not wait any more is in its place.
             let is_new = names.contains(name) && !is_present(&new.join(name))?;
             if !is_new && is_regular(&path)? {
+                folders::make_for(&old, name).map_err(IoError::write(&path))?;
                 rename(&path, &old.join(name), &path)?;
             }
             if name == MANIFEST_NAME {
@@ -150,20 +151,28 @@ impl Journal {
             }
         }
         if !self.old.is_empty() {
-            sync_directory(&old)?;
+            folders::sync(&old, self.old.iter().map(String::as_str))?;
         }
         for name in &self.new {
             let path = directory.join(name);
             if name == MANIFEST_NAME {
-                sync_directory(directory)?;
+                self.sync_folders(directory)?;
             }
             if is_present(&new.join(name))? {
+                folders::make_for(directory, name).map_err(IoError::write(&path))?;
                 rename(&new.join(name), &path, &path)?;
             } else if !is_present(&path)? {
                 return Err(IoError::write(path)(io::ErrorKind::NotFound.into()));
             }
         }
-        sync_directory(directory)
+        folders::prune(directory, self.old.iter().map(String::as_str));
+        self.sync_folders(directory)
+    }
+
+    /// Syncs a directory with those in it that names lead through.
+    fn sync_folders(&self, directory: &Path) -> Result<(), IoError> {
+        let names = self.new.iter().chain(&self.old);
+        folders::sync(directory, names.map(String::as_str))
     }
 
     /// Moves new files back and old ones to their place, as far as they are not there yet.
@@ -174,20 +183,23 @@ impl Journal {
             let path = directory.join(name);
             let is_old = names.contains(name) && !is_present(&old.join(name))?;
             if !is_old && !is_present(&new.join(name))? && is_present(&path)? {
+                folders::make_for(&new, name).map_err(IoError::write(&path))?;
                 rename(&path, &new.join(name), &path)?;
             }
         }
-        sync_directory(directory)?;
+        folders::prune(directory, self.new.iter().map(String::as_str));
+        self.sync_folders(directory)?;
         for name in self.old.iter().rev() {
             let path = directory.join(name);
             if name == MANIFEST_NAME {
-                sync_directory(directory)?;
+                self.sync_folders(directory)?;
             }
             if is_present(&old.join(name))? {
+                folders::make_for(directory, name).map_err(IoError::write(&path))?;
                 rename(&old.join(name), &path, &path)?;
             }
         }
-        sync_directory(directory)
+        self.sync_folders(directory)
     }
 }
 
@@ -233,7 +245,7 @@ fn rename(from: &Path, to: &Path, shown: &Path) -> Result<(), IoError> {
 }
 
 /// Renames where nothing has the new name.
-pub(super) fn rename_onto_nothing(from: &Path, to: &Path) -> io::Result<()> {
+pub(in super::super) fn rename_onto_nothing(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::io::Errno;
     match rename_new(from, to) {
         // Not every file system can; then a name that comes in this very moment is lost.

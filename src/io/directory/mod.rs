@@ -12,6 +12,7 @@
 //! The old files are removed only when the new ones are in their place for good, and never after a failure.
 
 mod exchange;
+mod folders;
 mod journal;
 mod old;
 mod staging;
@@ -22,27 +23,18 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use super::ending::{self, Registration, Remains};
 use super::error::IoError;
-use super::manifest::{self, MANIFEST_NAME};
-use super::syncer::{Failure, Syncer};
+use super::manifest::MANIFEST_NAME;
+use super::staged::{StagedFiles, WrittenFile, directories};
 use exchange::Exchanged;
 use journal::{Journal, new_place};
 use old::Old;
 use staging::{STAGING, Staging, Unfinished, create_directories, is_staging, remove_if_empty};
 
+pub(super) use journal::rename_onto_nothing;
 pub(super) use staging::{is_unsettled, recover};
-
-/// Size and digest of a file that was written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WrittenFile {
-    /// Bytes in the file.
-    pub bytes: u64,
-    /// BLAKE3 digest, 64 hexadecimal digits.
-    pub blake3: String,
-}
 
 /// An output directory while it is being filled.
 ///
@@ -60,8 +52,7 @@ pub struct StackDirectory {
     _registration: Registration,
     force: bool,
     old: Old,
-    names: Mutex<BTreeSet<String>>,
-    syncer: Syncer,
+    files: StagedFiles,
     committed: bool,
 }
 
@@ -113,6 +104,11 @@ impl StackDirectory {
         })?;
         match prepare(&path, force, find) {
             Ok((staging, old)) => Ok(Self {
+                files: StagedFiles::new(
+                    new_place(&staging.path),
+                    path.clone(),
+                    old.replaced.clone(),
+                ),
                 path,
                 created,
                 staging: Some(staging),
@@ -120,8 +116,6 @@ impl StackDirectory {
                 _registration: registration,
                 force,
                 old,
-                names: Mutex::default(),
-                syncer: Syncer::start(),
                 committed: false,
             }),
             Err(error) => {
@@ -137,72 +131,20 @@ impl StackDirectory {
         &self.path
     }
 
-    /// Writes one file, which is synced while others are written; it appears under `name` at the
-    /// commit, which waits for the sync.
+    /// The files on their way: what is made there appears at the commit.
+    pub(super) fn files(&self) -> &StagedFiles {
+        &self.files
+    }
+
+    /// Writes one file, which is synced while others are written; it appears under `name`, which may lead through
+    /// directories, at the commit, which waits for the sync.
     ///
     /// # Errors
-    /// [`IoError::FileName`] when the name is not a plain one, [`IoError::WrittenTwice`] and
+    /// [`IoError::FileName`] when the name is not a plain one, [`IoError::WrittenTwice`], [`IoError::Clash`] and
     /// [`IoError::Occupied`] when it is taken, [`IoError::Write`] when the system refuses this file
     /// or has refused to sync one before it, which ends the stack.
     pub fn write_file(&self, name: &str, bytes: &[u8]) -> Result<WrittenFile, IoError> {
-        self.write_digested(name, bytes, blake3::hash(bytes))
-    }
-
-    /// As [`write_file`](Self::write_file), for bytes whose digest is known.
-    pub(super) fn write_digested(
-        &self,
-        name: &str,
-        bytes: &[u8],
-        blake3: blake3::Hash,
-    ) -> Result<WrittenFile, IoError> {
-        if let Err(reason) = manifest::check_file_name(name) {
-            return Err(IoError::FileName {
-                path: self.path.clone(),
-                name: name.into(),
-                reason,
-            });
-        }
-        let path = self.path.join(name);
-        if !self.old.replaced.contains(name) && exists(&path) {
-            return Err(IoError::Occupied { path });
-        }
-        if !lock(&self.names).insert(name.into()) {
-            return Err(IoError::WrittenTwice { path });
-        }
-        let file = self.stage(name, |file| file.write_all(bytes))?;
-        (self.syncer.sync(name, file)).map_err(|failure| self.not_synced(failure))?;
-        Ok(WrittenFile {
-            bytes: bytes.len() as u64,
-            blake3: blake3.to_hex().to_string(),
-        })
-    }
-
-    fn not_synced(&self, failure: Failure) -> IoError {
-        IoError::write(self.path.join(failure.name))(failure.error)
-    }
-
-    /// Writes a file into the staging directory; the caller syncs it.
-    fn stage(
-        &self,
-        name: &str,
-        content: impl FnOnce(&mut File) -> io::Result<()>,
-    ) -> Result<File, IoError> {
-        let staged = new_place(&self.staging_path()).join(name);
-        let write = || {
-            let mut file = {
-                let _begun = ending::begin()?;
-                File::create_new(&staged)?
-            };
-            content(&mut file)?;
-            Ok(file)
-        };
-        write().map_err(|source| {
-            // A partial file must not be there to be renamed; its name is free again.
-            let _ = fs::remove_file(&staged);
-            lock(&self.names).remove(name);
-            // The final name is the one the user knows.
-            IoError::write(self.path.join(name))(source)
-        })
+        self.files.write(name, bytes, blake3::hash(bytes))
     }
 
     fn staging_path(&self) -> PathBuf {
@@ -225,10 +167,9 @@ impl StackDirectory {
         mut self,
         manifest: impl FnOnce(&mut File) -> io::Result<()>,
     ) -> Result<(), IoError> {
-        let file = self.stage(MANIFEST_NAME, manifest)?;
-        file.sync_all()
+        self.write_manifest(manifest)
             .map_err(IoError::write(self.path.join(MANIFEST_NAME)))?;
-        self.finish_files()?;
+        self.files.finish()?;
         let _begun = ending::begin().map_err(IoError::write(&self.path))?;
         self.check_unchanged()?;
         if !self.old.had_manifest && exists(&self.path.join(MANIFEST_NAME)) {
@@ -252,7 +193,7 @@ impl StackDirectory {
         allow(dead_code, reason = "only a command writes files that are no stack")
     )]
     pub(crate) fn commit_files(mut self) -> Result<(), IoError> {
-        self.finish_files()?;
+        self.files.finish()?;
         let _begun = ending::begin().map_err(IoError::write(&self.path))?;
         self.check_unchanged()?;
         self.place(None)?;
@@ -260,10 +201,15 @@ impl StackDirectory {
         Ok(())
     }
 
-    /// Waits until every staged file is on the disk, under its name.
-    fn finish_files(&mut self) -> Result<(), IoError> {
-        (self.syncer.finish()).map_err(|failure| self.not_synced(failure))?;
-        sync_directory(&new_place(&self.staging_path()))
+    /// Writes the manifest beside the other files, and syncs it.
+    fn write_manifest(&self, manifest: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+        let staged = new_place(&self.staging_path()).join(MANIFEST_NAME);
+        let mut file = {
+            let _begun = ending::begin()?;
+            File::create_new(staged)?
+        };
+        manifest(&mut file)?;
+        file.sync_all()
     }
 
     /// What was found at the start must still hold: files may have come since.
@@ -278,9 +224,8 @@ impl StackDirectory {
                 });
             }
         }
-        for name in lock(&self.names).iter() {
-            let path = self.path.join(name);
-            if !self.old.replaced.contains(name) && exists(&path) {
+        for name in self.files.names() {
+            if let Some(path) = self.files.in_the_way(&name) {
                 return Err(IoError::Occupied { path });
             }
         }
@@ -312,7 +257,7 @@ impl StackDirectory {
     ///
     /// * `manifest`: the file that comes last, and goes first.
     fn place(&mut self, manifest: Option<&str>) -> Result<(), IoError> {
-        let mut new: Vec<String> = lock(&self.names).iter().cloned().collect();
+        let mut new = self.files.names();
         new.extend(manifest.map(str::to_owned));
         let old = manifest.filter(|_| self.old.had_manifest);
         let old = old.into_iter().map(str::to_owned);
@@ -351,7 +296,7 @@ impl StackDirectory {
 
 impl Drop for StackDirectory {
     fn drop(&mut self) {
-        self.syncer.abandon();
+        self.files.abandon();
         if let Some(staging) = self.staging.take() {
             // The process does not end while its name may become another run's.
             let _begun = ending::begin();
@@ -414,6 +359,32 @@ pub(super) fn entries(path: &Path) -> Result<Vec<String>, IoError> {
         .map_err(IoError::read(path))
 }
 
+/// Names in a directory, and instead of a directory there that one of the `listed` names leads through those in it, as
+/// `a/b`.
+pub(super) fn files_below<'a>(
+    path: &Path,
+    listed: impl Iterator<Item = &'a str>,
+) -> io::Result<Vec<PathBuf>> {
+    let opened: BTreeSet<PathBuf> = directories(listed).into_iter().map(PathBuf::from).collect();
+    let names = |below: &Path| -> io::Result<Vec<PathBuf>> {
+        let entries = fs::read_dir(path.join(below))?;
+        entries
+            .map(|entry| Ok(below.join(entry?.file_name())))
+            .collect()
+    };
+    let mut waiting = names(Path::new(""))?;
+    let mut found = Vec::new();
+    while let Some(name) = waiting.pop() {
+        let data = fs::symlink_metadata(path.join(&name));
+        if opened.contains(&name) && data.is_ok_and(|data| data.is_dir()) {
+            waiting.extend(names(&name)?);
+        } else {
+            found.push(name);
+        }
+    }
+    Ok(found)
+}
+
 pub(super) fn sync_directory(path: &Path) -> Result<(), IoError> {
     let synced = File::open(path).and_then(|directory| directory.sync_all());
     match synced {
@@ -445,13 +416,6 @@ pub(super) fn sync_parent(path: &Path) -> Result<(), IoError> {
         }
         other => other,
     }
-}
-
-/// A poisoned set of names is still a set of names: inserting cannot leave it half done.
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 /// Bytes that an ordinary user can still write at `path`, or at its nearest existing ancestor.

@@ -1,19 +1,19 @@
 //! What is in a directory that a new stack replaces.
 //!
-//! A manifest found there is input from strangers: only plain names of regular files directly in the directory are
-//! ever replaced, a manifest that is not a stack's is not touched at all, and a file whose bytes are not those that
+//! A manifest found there is input from strangers: only plain names of regular files in the directory, or in directories of
+//! its own below, are ever replaced, a manifest that is not a stack's is not touched at all, and a file whose bytes are not those that
 //! were written is somebody's work and stays.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
 use std::io;
 use std::os::unix::fs::MetadataExt as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use super::staging::is_staging;
-use super::{MANIFEST_NAME, entries};
+use super::{MANIFEST_NAME, entries, files_below, folders};
 use crate::io::error::IoError;
 use crate::io::manifest::{self, ListedFile};
 
@@ -112,10 +112,15 @@ impl Old {
 
     /// Whether the directory holds more than what is replaced.
     pub(super) fn has_others(&self, path: &Path) -> Result<bool, IoError> {
-        let is_ours = |name: &String| {
-            is_staging(name) || name == MANIFEST_NAME || self.replaced.contains(name)
+        let is_ours = |name: &PathBuf| {
+            let name = name.to_str();
+            name.is_some_and(|name| {
+                is_staging(name) || name == MANIFEST_NAME || self.replaced.contains(name)
+            })
         };
-        Ok(!entries(path)?.iter().all(is_ours))
+        let listed = self.replaced.iter().map(String::as_str);
+        let found = files_below(path, listed).map_err(IoError::read(path))?;
+        Ok(!found.iter().all(is_ours))
     }
 
     /// Refuses when a file has changed since it was looked at.
@@ -153,6 +158,16 @@ fn listed(path: &Path) -> Result<Vec<ListedFile>, IoError> {
 
 /// What a file is, where it is there at all; what is no regular file is refused.
 fn stamp(path: &Path, name: &str) -> Result<Option<Stamp>, IoError> {
+    if let Err(error) = folders::check_own(path, name) {
+        return Err(match error.kind() {
+            io::ErrorKind::NotADirectory => IoError::FileName {
+                path: path.into(),
+                name: name.into(),
+                reason: "leads through what is no directory",
+            },
+            _ => IoError::read(path.join(name))(error),
+        });
+    }
     match fs::symlink_metadata(path.join(name)) {
         Ok(data) if data.is_file() => Ok(Some(Stamp::of(&data))),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::io::write_file_atomically;
+use crate::io::{manifest, write_file_atomically};
 
 fn listing(path: &Path) -> Vec<String> {
     let mut names = entries(path).unwrap();
@@ -179,7 +179,10 @@ fn hostile_manifests_reach_nothing_outside() {
         ".",
         "",
         "a/../../victim",
-        "sub/file",
+        "sub//file",
+        "sub/",
+        "sub/.hidden",
+        "1/2/3/4/5/6/7/8/9",
         "a\\b",
         "nul\0byte",
         "line\nbreak",
@@ -255,17 +258,84 @@ fn a_living_run_is_not_swept_away() {
 fn names_are_plain_and_written_once() {
     let out = tempfile::tempdir().unwrap();
     let stack = StackDirectory::create(out.path(), false).unwrap();
-    for name in ["../x", "/x", "a/b", "", "..", "manifest.json"] {
+    for name in ["../x", "/x", "a/../b", "a/", "", "..", "manifest.json"] {
         assert!(matches!(
             stack.write_file(name, b""),
             Err(IoError::FileName { .. })
         ));
     }
-    stack.write_file("x", b"").unwrap();
+    for name in ["x", "a/b"] {
+        stack.write_file(name, b"").unwrap();
+        assert!(matches!(
+            stack.write_file(name, b""),
+            Err(IoError::WrittenTwice { .. })
+        ));
+    }
+}
+
+/// Files in directories go and come as others do, and so do the directories; what is foreign stays where it is.
+#[test]
+fn files_in_directories_are_replaced_as_others() {
+    let root = tempfile::tempdir().unwrap();
+    let out = root.path().join("out");
+    let stack = |force, names: &[&str]| {
+        let stack = StackDirectory::create(&out, force).unwrap();
+        for name in names {
+            stack.write_file(name, b"old").unwrap();
+        }
+        stack.commit(old_manifest(names).as_bytes()).unwrap();
+    };
+    let listed = || {
+        let opened = ["t/a/1", "t/b/1", "u/1"];
+        let mut found = files_below(&out, opened.into_iter()).unwrap();
+        found.sort();
+        found
+            .iter()
+            .map(|f| f.display().to_string())
+            .collect::<Vec<_>>()
+    };
+    stack(false, &["t/a/1", "t/a/2", "t/b/1"]);
+    assert_eq!(listed(), ["manifest.json", "t/a/1", "t/a/2", "t/b/1"]);
+    stack(true, &["t/a/1", "u/1"]);
+    assert_eq!(listed(), ["manifest.json", "t/a/1", "u/1"]);
+    assert!(!out.join("t/b").exists());
+    // By the journal.
+    fs::write(out.join("t/a/mine"), "mine").unwrap();
+    stack(true, &["t/b/1"]);
+    assert_eq!(listed(), ["manifest.json", "t/a/mine", "t/b/1"]);
+    assert!(!out.join("u").exists());
+    // A failure at the end brings back what was there.
+    let failing = StackDirectory::create(&out, true).unwrap();
+    failing.write_file("t/a/1", b"new").unwrap();
+    failing.write_file("u/1", b"new").unwrap();
+    fs::write(out.join("u"), "in the way").unwrap();
     assert!(matches!(
-        stack.write_file("x", b""),
-        Err(IoError::WrittenTwice { .. })
+        failing.commit(b"{}"),
+        Err(IoError::Occupied { .. })
     ));
+    assert_eq!(listed(), ["manifest.json", "t/a/mine", "t/b/1", "u"]);
+    // Nor is anything written into a directory that is not the stack's.
+    fs::remove_file(out.join("u")).unwrap();
+    fs::create_dir(out.join("u")).unwrap();
+    let refused = StackDirectory::create(&out, true).unwrap();
+    let error = refused.write_file("u/1", b"new").unwrap_err();
+    assert!(matches!(error, IoError::Occupied { .. }), "{error}");
+    assert_eq!(listing(root.path()), ["out"]);
+}
+
+/// A listed name that leads through a link would reach files elsewhere.
+#[cfg(unix)]
+#[test]
+fn names_do_not_lead_through_links() {
+    let root = tempfile::tempdir().unwrap();
+    let (out, other) = (root.path().join("out"), root.path().join("other"));
+    write_all(&other, &[("file", "old")]);
+    fs::create_dir(&out).unwrap();
+    std::os::unix::fs::symlink(&other, out.join("link")).unwrap();
+    fs::write(out.join("manifest.json"), old_manifest(&["link/file"])).unwrap();
+    let error = StackDirectory::create(&out, true).unwrap_err();
+    assert!(matches!(error, IoError::FileName { .. }), "{error}");
+    assert_eq!(fs::read(other.join("file")).unwrap(), b"old");
 }
 
 #[test]

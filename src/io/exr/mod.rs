@@ -24,6 +24,7 @@ mod error;
 mod header;
 mod runs;
 mod samples;
+mod slices;
 #[cfg(test)]
 mod testing;
 
@@ -35,6 +36,8 @@ pub use self::encode::{LayerEncoder, encode_layer};
 pub use self::error::ExrError;
 pub(crate) use self::header::check_channel_name;
 pub use self::samples::{SampleKind, Samples};
+pub(super) use self::slices::Slices;
+pub use self::slices::largest_slice_bytes;
 pub use super::stack::{StackChannel, write_stack};
 
 /// What the sign of the distance means, as `voxlathe:signConvention` says it.

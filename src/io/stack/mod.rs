@@ -20,25 +20,27 @@ mod space;
 mod statistics;
 mod volumes;
 
-pub use self::space::{Expected, StackSpace, largest_slice_bytes, largest_stack_bytes};
+pub use self::space::{Expected, StackSpace, largest_stack_bytes};
 pub(super) use self::statistics::Statistics;
 pub use self::volumes::{StackChannel, write_stack};
 
-use std::collections::BTreeMap;
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::directory::{StackDirectory, WrittenFile};
+use super::directory::StackDirectory;
 use super::error::IoError;
-use super::exr::{
-    Compression, ExrError, LayerEncoder, SIGN_CONVENTION, SampleKind, Samples, check_channel_name,
-    layer_attributes,
-};
+pub use super::exr::largest_slice_bytes;
+use super::exr::{Compression, ExrError, SIGN_CONVENTION, SampleKind, Samples, check_channel_name};
+use super::format::{self, Description, Format, FormatKind, Layer};
 use super::manifest::{
     ChannelRecord, FORMAT, FileRecord, MANIFEST_NAME, Manifest, ManifestGrid, MaterialVolume,
     SCHEMA, WriteScene, slice_name,
 };
+use super::output::SingleOutput;
+use super::staged::StagedFiles;
 use crate::grid::{Channel, GridSpec};
 
 /// A channel that each layer of a stack has.
@@ -52,6 +54,9 @@ pub struct ChannelSpec {
     pub meaning: String,
     /// Unit of the samples, where they have one.
     pub unit: Option<String>,
+    /// The axis across which the samples are those of sides, of which there is one more along it; formats whose arrays
+    /// may have their own shape hold the last of them, too.
+    pub staggered: Option<usize>,
 }
 
 impl ChannelSpec {
@@ -76,6 +81,7 @@ impl ChannelSpec {
             kind,
             meaning,
             unit: known.and_then(|channel| channel.unit().label(units)),
+            staggered: known.and_then(Channel::staggered),
         }
     }
 
@@ -93,8 +99,8 @@ pub struct StackOptions {
     pub units: String,
     /// Name and BLAKE3 digest of the resolved scene, where there is one.
     pub scene: Option<SceneLabel>,
-    /// Compression of the slices.
-    pub compression: Compression,
+    /// The formats of its files, each once; slices of `auto` compression by default.
+    pub formats: Vec<FormatKind>,
     /// Whether an old stack in the directory makes way.
     pub force: bool,
 }
@@ -104,7 +110,7 @@ impl Default for StackOptions {
         Self {
             units: "m".into(),
             scene: None,
-            compression: Compression::Auto,
+            formats: vec![FormatKind::Exr(Compression::Auto)],
             force: false,
         }
     }
@@ -151,32 +157,42 @@ pub struct StackSummary {
 /// Dropping it before [`finish`](Self::finish) leaves no trace of it.
 #[derive(Debug)]
 pub struct StackWriter {
-    directory: StackDirectory,
-    grid: GridSpec,
-    channels: Vec<ChannelSpec>,
-    options: StackOptions,
-    compression: Compression,
+    // Before the directory, so that no file is open when that goes.
+    formats: Vec<Box<dyn Format>>,
+    kinds: Vec<FormatKind>,
+    of: Description,
     written: Mutex<Written>,
-    /// Buffers that no thread is using: as many as threads have ever written at the same time.
-    encoders: Mutex<Vec<LayerEncoder>>,
+    place: Place,
 }
 
-/// Why a layer is not written.
-enum Refusal {
-    Exr(ExrError),
-    /// What is wrong with a sample.
-    Sample(String),
+/// Where the files will be.
+#[derive(Debug)]
+enum Place {
+    Directory(StackDirectory),
+    /// One file, without a manifest.
+    Single(SingleOutput),
 }
 
-impl From<ExrError> for Refusal {
-    fn from(error: ExrError) -> Self {
-        Self::Exr(error)
+impl Place {
+    fn files(&self) -> &StagedFiles {
+        match self {
+            Self::Directory(directory) => directory.files(),
+            Self::Single(output) => output.files(),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Directory(directory) => directory.path(),
+            Self::Single(output) => output.path(),
+        }
     }
 }
 
 #[derive(Debug, Default)]
 struct Written {
-    layers: BTreeMap<usize, (FileRecord, Vec<Statistics>)>,
+    begun: BTreeSet<usize>,
+    layers: BTreeMap<usize, Vec<Statistics>>,
     others: Vec<FileRecord>,
 }
 
@@ -184,7 +200,8 @@ impl StackWriter {
     /// A stack of `grid` in the directory `path`, each layer with all of `channels`.
     ///
     /// # Errors
-    /// As [`StackDirectory::create`], and [`IoError::Exr`] when a channel cannot be one.
+    /// As [`StackDirectory::create`], [`IoError::Exr`] when a channel cannot be one, [`IoError::Mismatch`] and
+    /// [`IoError::Clash`] when a format cannot hold the channels.
     pub fn create(
         path: impl AsRef<Path>,
         grid: &GridSpec,
@@ -192,93 +209,236 @@ impl StackWriter {
         options: StackOptions,
     ) -> Result<Self, IoError> {
         let path = path.as_ref();
+        let force = options.force;
+        let open = || StackDirectory::create(path, force).map(Place::Directory);
+        Self::create_at(path, grid, channels, options, None, open)
+    }
+
+    /// As [`create`](Self::create), with one file and no manifest: `path` is its name, which must be free unless the
+    /// options have `force`, and `format` its format.
+    ///
+    /// # Errors
+    /// [`IoError::Exists`] when it is not free, [`IoError::Mismatch`] when the format has a file for each channel and
+    /// there are several, and as [`create`](Self::create).
+    pub fn create_single(
+        path: impl AsRef<Path>,
+        grid: &GridSpec,
+        channels: Vec<ChannelSpec>,
+        format: FormatKind,
+        options: StackOptions,
+    ) -> Result<Self, IoError> {
+        let path = path.as_ref();
+        let force = options.force;
+        let options = StackOptions {
+            formats: vec![format],
+            ..options
+        };
+        if let Err(reason) = format.check_single(&channels) {
+            let path = path.into();
+            return Err(IoError::Mismatch { path, reason });
+        }
+        let name = SingleOutput::name(path)?;
+        let is_tree = matches!(format, FormatKind::Zarr(_));
+        let open = || SingleOutput::create(path, is_tree, force).map(Place::Single);
+        Self::create_at(path, grid, channels, options, Some(name), open)
+    }
+
+    fn create_at(
+        path: &Path,
+        grid: &GridSpec,
+        channels: Vec<ChannelSpec>,
+        options: StackOptions,
+        file: Option<String>,
+        open: impl FnOnce() -> Result<Place, IoError>,
+    ) -> Result<Self, IoError> {
         check_specs(&channels).map_err(|error| IoError::Exr {
             path: path.into(),
             error,
         })?;
-        Ok(Self {
-            directory: StackDirectory::create(path, options.force)?,
+        let names = || channels.iter().map(|c| c.name.as_str());
+        let kinds: Vec<FormatKind> = (options.formats.iter())
+            .map(|kind| match kind {
+                FormatKind::Exr(compression) => FormatKind::Exr(compression.resolve(names())),
+                other => *other,
+            })
+            .collect();
+        let of = Description {
             grid: *grid,
-            compression: options
-                .compression
-                .resolve(channels.iter().map(|c| c.name.as_str())),
+            units: options.units,
+            scene: options.scene,
             channels,
-            options,
+            file,
+        };
+        for kind in &kinds {
+            kind.check(&of).map_err(|reason| IoError::Mismatch {
+                path: path.into(),
+                reason,
+            })?;
+        }
+        let place = open()?;
+        Ok(Self {
+            formats: format::begin(&kinds, place.files(), &of)?,
+            kinds,
+            of,
             written: Mutex::default(),
-            encoders: Mutex::default(),
+            place,
         })
     }
 
-    /// The compression of the slices, with `auto` resolved.
+    /// The formats of the files, with `auto` compression resolved.
     #[must_use]
-    pub fn compression(&self) -> Compression {
-        self.compression
+    pub fn formats(&self) -> &[FormatKind] {
+        &self.kinds
     }
 
     /// Writes layer `k` from samples by channel name. Threads may call this at the same time, with the layers in any
     /// order.
     ///
     /// # Errors
-    /// [`IoError::LayerOutside`], [`IoError::WrittenTwice`], [`IoError::Mismatch`] or
+    /// [`IoError::LayerOutside`], [`IoError::LayerTwice`], [`IoError::Mismatch`] or
     /// [`IoError::Exr`] when the layer is not one of the stack's, [`IoError::Write`] when the
     /// system refuses.
     pub fn write_layer(&self, k: usize, layer: &[(&str, Samples<'_>)]) -> Result<(), IoError> {
-        let [nx, ny, layers] = self.grid.dims();
+        self.write_layer_with_last(k, layer, &[])
+    }
+
+    /// As [`write_layer`](Self::write_layer), with what staggered channels have beyond the last voxel, by name: across x a
+    /// sample for each row, across y one for each column, across z a layer of them with the last layer.
+    ///
+    /// # Errors
+    /// As [`write_layer`](Self::write_layer), and [`IoError::Mismatch`] where samples are missing.
+    pub fn write_layer_with_last(
+        &self,
+        k: usize,
+        layer: &[(&str, Samples<'_>)],
+        last: &[(&str, &[f32])],
+    ) -> Result<(), IoError> {
+        let [nx, ny, layers] = self.of.grid.dims();
+        let directory = self.place.path();
         if k >= layers {
             return Err(IoError::LayerOutside {
-                path: self.directory.path().into(),
+                path: directory.into(),
                 layer: k,
                 layers,
             });
         }
-        let name = slice_name(k, layers);
-        let path = self.directory.path().join(&name);
         let mismatch = |reason| IoError::Mismatch {
-            path: path.clone(),
+            path: self.layer_path(k),
             reason,
         };
         let samples = self.pick(layer).map_err(mismatch)?;
-        let scene = self.options.scene.as_ref();
-        let attributes = layer_attributes(
-            &self.grid,
-            k,
-            &self.options.units,
-            scene.map(|s| (s.name.as_str(), s.hash.as_str())),
-        );
-        let mut statistics = vec![Statistics::NONE; samples.len()];
-        let look = |rows: Range<usize>| {
-            for ((channel, samples), found) in
-                self.channels.iter().zip(&samples).zip(&mut statistics)
-            {
-                (found.add(&channel.name, samples, rows.clone(), nx)).map_err(Refusal::Sample)?;
+        let statistics = RefCell::new(vec![Statistics::NONE; samples.len()]);
+        let seen = Cell::new(0);
+        let watch = |rows: Range<usize>| {
+            let rows = rows.start.max(seen.get())..rows.end;
+            if !rows.is_empty() {
+                seen.set(rows.end);
+                let mut statistics = statistics.borrow_mut();
+                for ((name, samples), found) in samples.iter().zip(statistics.iter_mut()) {
+                    found.add(name, samples, rows.clone(), nx)?;
+                }
             }
             Ok(())
         };
-        let mut encoder = self.encoders().pop().unwrap_or_default();
-        let written = encoder
-            .encode_watched([nx, ny], layer, &attributes, self.compression, look)
-            .map_err(|refusal| match refusal {
-                Refusal::Exr(error) => IoError::Exr {
-                    path: path.clone(),
-                    error,
-                },
-                Refusal::Sample(reason) => mismatch(reason),
-            })
-            .and_then(|file| (self.directory).write_digested(&name, file.bytes, file.blake3));
-        self.encoders().push(encoder);
-        let written = written?;
-        let z = self.grid.centre_along(2, k);
-        let record = file_record(name, Some((k, z)), written);
-        self.written().layers.insert(k, (record, statistics));
+        let last = self.pick_last(k, last).map_err(mismatch)?;
+        let layer = Layer {
+            k,
+            channels: &samples,
+            last: &last,
+            watch: &watch,
+        };
+        if !self.written().begun.insert(k) {
+            return Err(IoError::LayerTwice {
+                path: directory.into(),
+                layer: k,
+            });
+        }
+        let has_slices_alone = matches!(self.kinds[..], [FormatKind::Exr(_)]);
+        let looked = if has_slices_alone {
+            // They look themselves, row by row, and write nothing of a layer that is wrong.
+            (self.formats[0].layer(self.place.files(), &layer))
+                .and_then(|()| layer.look(0..ny).map_err(mismatch))
+        } else {
+            self.check_lengths(&samples)
+                .and_then(|()| layer.look(0..ny))
+                .map_err(mismatch)
+        };
+        if let Err(error) = looked {
+            self.written().begun.remove(&k);
+            return Err(error);
+        }
+        if !has_slices_alone {
+            let files = self.place.files();
+            (self.formats.iter()).try_for_each(|format| format.layer(files, &layer))?;
+        }
+        self.written().layers.insert(k, statistics.into_inner());
         Ok(())
     }
 
+    /// What each channel has beyond the last voxel of layer `k`, or why it is not that.
+    fn pick_last<'a>(
+        &self,
+        k: usize,
+        last: &[(&str, &'a [f32])],
+    ) -> Result<Vec<&'a [f32]>, String> {
+        let [nx, ny, nz] = self.of.grid.dims();
+        let is_wanted = self.kinds.iter().any(FormatKind::is_staggered);
+        let one = |channel: &ChannelSpec| {
+            let wanted = match channel.staggered {
+                Some(0) => ny,
+                Some(1) => nx,
+                Some(_) if k + 1 == nz => nx * ny,
+                _ => 0,
+            };
+            let found = last.iter().find(|one| one.0 == channel.name);
+            let found = found.map_or(&[][..], |one| one.1);
+            if is_wanted && found.len() != wanted {
+                return Err(format!(
+                    "channel {:?} has {} samples beyond the last voxel, and {wanted} are needed",
+                    channel.name,
+                    found.len()
+                ));
+            }
+            Ok(found)
+        };
+        self.of.channels.iter().map(one).collect()
+    }
+
+    /// What is named where layer `k` is wrong.
+    fn layer_path(&self, k: usize) -> std::path::PathBuf {
+        if self
+            .kinds
+            .iter()
+            .any(|kind| matches!(kind, FormatKind::Exr(_)))
+        {
+            let name = slice_name(k, self.of.grid.dims()[2]);
+            return self.place.path().join(name);
+        }
+        self.place.path().into()
+    }
+
+    fn check_lengths(&self, samples: &[(&str, Samples<'_>)]) -> Result<(), String> {
+        let [nx, ny, _] = self.of.grid.dims();
+        let wanted = self.of.grid.layer_len();
+        match samples.iter().find(|(_, samples)| samples.len() != wanted) {
+            Some((name, samples)) => Err(format!(
+                "channel {name:?} has {} samples; a layer of {nx} x {ny} voxels needs {wanted}",
+                samples.len()
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// The layer's samples in the order of the stack's channels, or why it is not one of its layers.
-    fn pick<'a>(&self, layer: &[(&str, Samples<'a>)]) -> Result<Vec<Samples<'a>>, String> {
-        let samples = (self.channels.iter())
+    fn pick<'a>(
+        &'a self,
+        layer: &[(&str, Samples<'a>)],
+    ) -> Result<Vec<(&'a str, Samples<'a>)>, String> {
+        let samples = (self.of.channels.iter())
             .map(|channel| {
                 let found = layer.iter().find(|c| c.0 == channel.name).map(|c| c.1);
-                found.filter(|s| s.kind() == channel.kind).ok_or_else(|| {
+                let found = found.filter(|s| s.kind() == channel.kind);
+                found.map(|s| (channel.name.as_str(), s)).ok_or_else(|| {
                     format!(
                         "the layer has no channel {:?} of type {:?}; give each layer every channel of the stack",
                         channel.name, channel.kind
@@ -286,45 +446,42 @@ impl StackWriter {
                 })
             })
             .collect::<Result<_, _>>()?;
-        if layer.len() != self.channels.len() {
+        if layer.len() != self.of.channels.len() {
             return Err(format!(
                 "the layer has {} channels, the stack {}; declare every channel when the stack is created",
                 layer.len(),
-                self.channels.len()
+                self.of.channels.len()
             ));
         }
         Ok(samples)
     }
 
-    /// Bytes that the whole stack will take, judging by the layers that are written: one that is not is taken to be as
-    /// large as the two written ones about it are on average. With what these take already; `None` where there is none.
+    /// Bytes that the whole stack will take, judging by the layers that are written, with what these take already;
+    /// `None` where that cannot be told.
     ///
-    /// * `beside`: bytes of the manifest and the files beside the slices; see [`StackSpace`].
+    /// * `beside`: bytes of the manifest and the files beside those of the formats; see [`StackSpace`].
     #[must_use]
     pub fn expected_bytes(&self, beside: u64) -> Option<Expected> {
-        let written = self.written();
-        let mut sizes = written.layers.iter().map(|(&k, (file, _))| (k, file.bytes));
-        let mut before = sizes.next()?;
-        let present: u64 = written.layers.values().map(|(file, _)| file.bytes).sum();
-        let mut between = before.0 as u64 * before.1;
-        for (k, bytes) in sizes {
-            let missing = (k - before.0 - 1) as u64;
-            between = between.saturating_add(missing * (before.1 + bytes) / 2);
-            before = (k, bytes);
-        }
-        let layers = self.grid.dims()[2];
-        let after = (layers - 1 - before.0) as u64 * before.1;
-        let rest = between.saturating_add(after).saturating_add(beside);
-        Some(Expected { present, rest })
+        let start = Expected {
+            present: 0,
+            rest: beside,
+        };
+        self.formats.iter().try_fold(start, |all, format| {
+            let one = format.expected_bytes()?;
+            Some(Expected {
+                present: all.present.saturating_add(one.present),
+                rest: all.rest.saturating_add(one.rest),
+            })
+        })
     }
 
-    /// Writes a file beside the slices; the manifest lists it too.
+    /// Writes a file beside the others; the manifest lists it too.
     ///
     /// # Errors
     /// As [`StackDirectory::write_file`].
     pub fn write_other(&self, name: &str, bytes: &[u8]) -> Result<(), IoError> {
-        let written = self.directory.write_file(name, bytes)?;
-        let record = file_record(name.into(), None, written);
+        let written = (self.place.files()).write(name, bytes, blake3::hash(bytes))?;
+        let record = format::record((name.into(), written));
         self.written().others.push(record);
         Ok(())
     }
@@ -360,49 +517,47 @@ impl StackWriter {
         summary: StackSummary,
         scene: Option<&WriteScene<'_>>,
     ) -> Result<Manifest, IoError> {
-        let path = self.directory.path().to_path_buf();
+        let path = self.place.path().to_path_buf();
         let written = self
             .written
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
-        let layers = self.grid.dims()[2];
+        let of = self.of;
+        let layers = of.grid.dims()[2];
         if let Some(layer) = (0..layers).find(|k| !written.layers.contains_key(k)) {
             return Err(IoError::LayerMissing { path, layer });
         }
-        let totals: Vec<Statistics> = (0..self.channels.len())
-            .map(|c| Statistics::join(written.layers.values().map(|(_, s)| s[c])))
+        let totals: Vec<Statistics> = (0..of.channels.len())
+            .map(|c| Statistics::join(written.layers.values().map(|s| s[c])))
             .collect();
-        let mut files: Vec<FileRecord> = written.layers.into_values().map(|l| l.0).collect();
+        let mut files = Vec::new();
+        for format in self.formats {
+            files.extend(format.finish(self.place.files())?);
+        }
         let mut others = written.others;
         others.sort_by(|a, b| a.name.cmp(&b.name));
         files.extend(others);
-        let description = Description {
-            grid: &self.grid,
-            channels: &self.channels,
-            options: &self.options,
-            compression: self.compression,
+        let contents = Contents {
+            of: &of,
+            kinds: &self.kinds,
         };
-        let manifest = description.manifest(files, &totals, summary);
+        let manifest = contents.manifest(files, &totals, summary);
         let mismatch = |reason| IoError::Mismatch {
             path: path.join(MANIFEST_NAME),
             reason,
         };
-        match scene {
-            None => {
+        match (self.place, scene) {
+            (Place::Directory(directory), None) => {
                 let bytes = manifest.to_bytes().map_err(mismatch)?;
-                self.directory.commit(&bytes)?;
+                directory.commit(&bytes)?;
             }
-            Some(scene) => {
+            (Place::Directory(directory), Some(scene)) => {
                 let write = manifest.written_with(scene).map_err(mismatch)?;
-                self.directory.commit_written(write)?;
+                directory.commit_written(write)?;
             }
+            (Place::Single(output), _) => output.commit()?,
         }
         Ok(manifest)
-    }
-
-    fn encoders(&self) -> MutexGuard<'_, Vec<LayerEncoder>> {
-        // An encoder is in the list or it is not.
-        self.encoders.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn written(&self) -> MutexGuard<'_, Written> {
@@ -412,14 +567,12 @@ impl StackWriter {
 }
 
 /// What a manifest says of a stack but for its files and what is in them.
-struct Description<'a> {
-    grid: &'a GridSpec,
-    channels: &'a [ChannelSpec],
-    options: &'a StackOptions,
-    compression: Compression,
+struct Contents<'a> {
+    of: &'a Description,
+    kinds: &'a [FormatKind],
 }
 
-impl Description<'_> {
+impl Contents<'_> {
     /// The manifest of these files, whose channels hold what `totals` says.
     fn manifest(
         &self,
@@ -427,12 +580,13 @@ impl Description<'_> {
         totals: &[Statistics],
         summary: StackSummary,
     ) -> Manifest {
+        let of = self.of;
         let total = |name: &str| {
-            let c = self.channels.iter().position(|c| c.name == name)?;
+            let c = of.channels.iter().position(|c| c.name == name)?;
             Some(totals[c])
         };
         let mut warnings = summary.warnings;
-        for (channel, total) in self.channels.iter().zip(totals) {
+        for (channel, total) in of.channels.iter().zip(totals) {
             if total.infinite > 0 {
                 warnings.push(format!(
                     "{} samples of {} are infinite; its range is that of the others",
@@ -440,7 +594,7 @@ impl Description<'_> {
                 ));
             }
         }
-        let voxel = self.grid.voxel_volume();
+        let voxel = of.grid.voxel_volume();
         let finite = |v: &f64| v.is_finite();
         let voxels_inside = total("occupancy")
             .map(|t| t.count)
@@ -454,8 +608,11 @@ impl Description<'_> {
         let fractions = stored.map(|sum| summary.fraction_sum.unwrap_or(sum));
         let volume_fraction = fractions.map(|sum| sum * voxel).filter(finite);
         let volume_fraction_stored = stored.map(|sum| sum * voxel).filter(finite);
-        let (scene_name, scene_hash) = self
-            .options
+        let compression = self.kinds.iter().find_map(|kind| match kind {
+            FormatKind::Exr(compression) => Some(compression.name().to_owned()),
+            _ => None,
+        });
+        let (scene_name, scene_hash) = of
             .scene
             .clone()
             .map_or((None, None), |s| (Some(s.name), Some(s.hash)));
@@ -465,14 +622,11 @@ impl Description<'_> {
             schema: SCHEMA,
             scene_name,
             scene_hash,
-            units: self.options.units.clone(),
+            units: of.units.clone(),
             sign_convention: SIGN_CONVENTION.into(),
-            grid: ManifestGrid::from(self.grid),
+            grid: ManifestGrid::from(&of.grid),
             bounds: summary.bounds,
-            channels: self
-                .channels
-                .iter()
-                .zip(totals)
+            channels: (of.channels.iter().zip(totals))
                 .map(|(c, t)| ChannelRecord {
                     name: c.name.clone(),
                     kind: c.kind,
@@ -481,7 +635,8 @@ impl Description<'_> {
                     range: t.range(),
                 })
                 .collect(),
-            compression: self.compression.name().into(),
+            formats: self.kinds.iter().map(|kind| kind.name().into()).collect(),
+            compression,
             files,
             voxels_inside,
             volume_occupancy,
@@ -512,16 +667,6 @@ fn check_specs(channels: &[ChannelSpec]) -> Result<(), ExrError> {
         }
     }
     Ok(())
-}
-
-fn file_record(name: String, layer: Option<(usize, f64)>, written: WrittenFile) -> FileRecord {
-    FileRecord {
-        name,
-        slice: layer.map(|l| l.0),
-        z: layer.map(|l| l.1),
-        bytes: written.bytes,
-        blake3: written.blake3,
-    }
 }
 
 #[cfg(test)]
@@ -629,7 +774,8 @@ pub(super) mod tests {
         let dir = tempfile::tempdir().unwrap();
         let manifest = write_ramp(dir.path(), 2, false);
         assert_eq!(Manifest::load(dir.path()).unwrap(), manifest);
-        assert_eq!(manifest.compression, "none");
+        assert_eq!(manifest.compression.as_deref(), Some("none"));
+        assert_eq!(manifest.formats, ["exr"]);
         let bytes: u64 = fs::read_dir(dir.path())
             .unwrap()
             .map(|e| e.unwrap().metadata().unwrap().len())
@@ -753,7 +899,7 @@ pub(super) mod tests {
         writer.write_layer(0, &layer).unwrap();
         assert_eq!(
             text(0, &layer),
-            "out/slice-0000.exr was written twice; each file of a stack has one writer"
+            "out: layer 0 was written twice; write each layer once"
         );
         for k in 1..5 {
             writer.write_layer(k, &layer).unwrap();

@@ -11,10 +11,12 @@
 //! [`StackWriter::expected_bytes`]: super::StackWriter::expected_bytes
 
 use super::super::exr::{
-    Attributes, Compression, ExrError, SampleKind, Samples, encode_layer, layer_attributes,
+    Attributes, Compression, ExrError, SampleKind, Samples, encode_layer, largest_slice_bytes,
+    layer_attributes,
 };
+use super::super::format::{Description, FormatKind};
 use super::super::manifest::{FileRecord, WriteScene, slice_name};
-use super::{ChannelSpec, Description, StackOptions, StackSummary, Statistics};
+use super::{ChannelSpec, Contents, StackSummary, Statistics};
 use crate::grid::GridSpec;
 
 /// What a stack takes on its disk.
@@ -37,9 +39,9 @@ impl Expected {
 /// What the files of a stack take before its samples are known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StackSpace {
-    /// Bytes of all slices without compression.
-    pub slices: u64,
-    /// Bytes of the manifest and of the files beside the slices.
+    /// Bytes of the files of all formats, slices without compression.
+    pub files: u64,
+    /// Bytes of the manifest and of the files beside those.
     pub beside: u64,
 }
 
@@ -50,35 +52,41 @@ impl StackSpace {
     /// # Errors
     /// [`ExrError`] when the layers do not fit the format, or the manifest cannot be written.
     pub fn new(
-        grid: &GridSpec,
-        channels: &[ChannelSpec],
-        options: &StackOptions,
+        of: &Description,
+        kinds: &[FormatKind],
         summary: StackSummary,
         scene: &WriteScene<'_>,
     ) -> Result<Self, ExrError> {
-        let slice = slice_bytes(grid, channels, options)?;
-        let layers = grid.dims()[2];
-        let file = |k: usize| FileRecord {
-            name: slice_name(k, layers),
-            slice: Some(k),
-            z: Some(grid.centre_along(2, k)),
-            bytes: slice,
+        let layers = of.grid.dims()[2];
+        let mut bytes = 0_u64;
+        let mut files = Vec::new();
+        let file = |name: String, layer: Option<usize>, bytes: u64| FileRecord {
+            name,
+            slice: layer,
+            z: layer.map(|k| of.grid.centre_along(2, k)),
+            bytes,
             blake3: "0".repeat(64),
         };
-        let totals: Vec<Statistics> = (channels.iter())
-            .map(|c| Statistics::likely(c, grid.voxel_count()))
+        for kind in kinds {
+            if let FormatKind::Exr(_) = kind {
+                let slice = slice_bytes(of)?;
+                bytes = bytes.saturating_add(slice.saturating_mul(layers as u64));
+                files.extend((0..layers).map(|k| file(slice_name(k, layers), Some(k), slice)));
+            } else {
+                let all = kind.needs(of).disk;
+                bytes = bytes.saturating_add(all);
+                let name = |c: &ChannelSpec| format!("{}.{}", c.name, kind.name());
+                files.extend(of.channels.iter().map(|c| file(name(c), None, all)));
+            }
+        }
+        let totals: Vec<Statistics> = (of.channels.iter())
+            .map(|c| Statistics::likely(c, of.grid.voxel_count()))
             .collect();
-        let description = Description {
-            grid,
-            channels,
-            options,
-            compression: Compression::None,
-        };
-        let files = (0..layers).map(file).collect();
-        let manifest = description.manifest(files, &totals, summary);
+        let contents = Contents { of, kinds };
+        let manifest = contents.manifest(files, &totals, summary);
         let manifest = manifest.length_with(scene);
         Ok(Self {
-            slices: slice.saturating_mul(layers as u64),
+            files: bytes,
             beside: manifest.map_err(|reason| ExrError::Encode { reason })?,
         })
     }
@@ -96,19 +104,16 @@ impl StackSpace {
     /// Bytes of the whole without compression.
     #[must_use]
     pub fn uncompressed(&self) -> u64 {
-        self.slices.saturating_add(self.beside)
+        self.files.saturating_add(self.beside)
     }
 }
 
 /// Bytes of a slice without compression.
-fn slice_bytes(
-    grid: &GridSpec,
-    channels: &[ChannelSpec],
-    options: &StackOptions,
-) -> Result<u64, ExrError> {
-    let scene = options.scene.as_ref();
+fn slice_bytes(of: &Description) -> Result<u64, ExrError> {
+    let (grid, channels) = (&of.grid, &of.channels);
+    let scene = of.scene.as_ref();
     let scene = scene.map(|s| (s.name.as_str(), s.hash.as_str()));
-    let attributes: Attributes = layer_attributes(grid, 0, &options.units, scene);
+    let attributes: Attributes = layer_attributes(grid, 0, &of.units, scene);
     // A header is as long for one voxel as for many.
     let one = |kind| match kind {
         SampleKind::Half => Samples::Half(&[0]),
@@ -124,10 +129,6 @@ fn slice_bytes(
     Ok(least - (LINE + pixel) + line_bytes(nx, pixel).saturating_mul(ny))
 }
 
-/// Bytes of a slice's header but for its channels, with a name of the scene as long as it may be.
-const HEADER: u64 = 1088;
-/// Bytes of a channel's entry there, but for its name.
-const CHANNEL: u64 = 18;
 /// Bytes of a file's record in the manifest.
 const RECORD: u64 = 224;
 /// Bytes of the rest of the manifest, but for a long scene.
@@ -150,16 +151,4 @@ pub fn largest_stack_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
         .saturating_add(RECORD)
         .saturating_mul(grid.dims()[2] as u64)
         .saturating_add(MANIFEST)
-}
-
-/// Bytes that one slice takes at most.
-///
-/// No slice is larger than its samples with the offsets and sizes of its lines and its header.
-#[must_use]
-pub fn largest_slice_bytes(grid: &GridSpec, channels: &[ChannelSpec]) -> u64 {
-    let [nx, ny, _] = grid.dims().map(|d| d as u64);
-    line_bytes(nx, pixel_bytes(channels))
-        .saturating_mul(ny)
-        .saturating_add(HEADER)
-        .saturating_add(channels.iter().map(|c| CHANNEL + c.name.len() as u64).sum())
 }

@@ -137,10 +137,10 @@ fn header(layer: &DecodedLayer, record: &FileRecord, k: usize, manifest: &Manife
     if scene.is_none() && layer.attributes.contains_key("voxlathe:sceneHash") {
         wrong.push(format!("{name} names a scene, and the manifest none"));
     }
-    if layer.compression.map(Compression::name) != Some(manifest.compression.as_str()) {
+    if layer.compression.map(Compression::name) != manifest.compression.as_deref() {
         wrong.push(format!(
             "{name} is not compressed by {:?}",
-            manifest.compression
+            manifest.compression.as_deref().unwrap_or("nothing")
         ));
     }
     let software = format!("voxlathe {}", manifest.version);
@@ -182,14 +182,12 @@ pub(super) fn of_manifest(manifest: &Manifest) -> Vec<String> {
         manifest.sign_convention == SIGN_CONVENTION,
         "its sign convention is unknown",
     );
-    let places: Vec<_> = manifest
-        .files
-        .iter()
-        .map(|f| (f.slice.is_none(), f.slice, &f.name))
-        .collect();
+    let slices: Vec<_> = manifest.files.iter().filter_map(|f| f.slice).collect();
+    hold(slices.is_sorted(), "its slices are not in the order of z");
+    let has_slices = manifest.formats.iter().any(|format| format == "exr");
     hold(
-        places.is_sorted(),
-        "its files are not in the order of z and names",
+        has_slices != slices.is_empty() && has_slices == manifest.compression.is_some(),
+        "its formats are not those of its files",
     );
     let hash = |text: &str| blake3::hash(text.as_bytes()).to_hex().to_string();
     if let (Some(own), false) = (&manifest.scene_hash, manifest.scene.is_null()) {
@@ -230,7 +228,7 @@ const STORED: f64 = 1.0 / (1_u64 << 24) as f64 + 1e-12;
 
 /// What the totals of all slices contradict.
 pub(super) fn of_totals(manifest: &Manifest, slices: &[Slice]) -> Vec<String> {
-    let rounding = if manifest.compression == Compression::Pxr24.name() {
+    let rounding = if manifest.compression.as_deref() == Some(Compression::Pxr24.name()) {
         ROUNDING
     } else {
         0.0

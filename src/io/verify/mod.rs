@@ -16,7 +16,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use self::claims::Slice;
-use super::directory::{entries, is_unsettled, recover};
+use super::directory::{files_below, is_unsettled, recover};
 use super::error::IoError;
 use super::manifest::{FileRecord, MANIFEST_NAME, Manifest, read_capped};
 
@@ -113,8 +113,11 @@ fn look(directory: &Path) -> Result<StackReport, IoError> {
         wrong.extend(claims::of_totals(&manifest, &slices));
     }
     let listed: BTreeSet<&str> = manifest.files.iter().map(|f| f.name.as_str()).collect();
-    let mut extra = entries(directory)?;
-    extra.retain(|name| name != MANIFEST_NAME && !listed.contains(name.as_str()));
+    let found = files_below(directory, listed.iter().copied()).map_err(IoError::read(directory))?;
+    let found = found.iter().map(|name| name.to_string_lossy().into_owned());
+    let mut extra: Vec<String> = found
+        .filter(|name| name != MANIFEST_NAME && !listed.contains(name.as_str()))
+        .collect();
     extra.sort();
     Ok(StackReport {
         manifest,

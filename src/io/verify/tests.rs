@@ -78,8 +78,10 @@ fn what_the_slices_contradict_is_found() {
         ("channel left out", |m| drop(m.channels.remove(3))),
         ("least", |m| m.channels[2].range = Some([-1.5, 3.5])),
         ("no range", |m| m.channels[1].range = None),
-        ("compression", |m| m.compression = "zip".into()),
-        ("unknown compression", |m| m.compression = "bogus".into()),
+        ("compression", |m| m.compression = Some("zip".into())),
+        ("unknown compression", |m| {
+            m.compression = Some("bogus".into())
+        }),
         ("inside", |m| m.voxels_inside = Some(7)),
         ("not inside", |m| m.voxels_inside = None),
         ("occupancy", |m| m.volume_occupancy = Some(1.0)),

@@ -1,0 +1,7 @@
+//! The guide: what a user of the command meets, a page for each subject.
+
+#[doc = include_str!("formats.md")]
+pub mod formats {}
+
+#[doc = include_str!("recipes.md")]
+pub mod recipes {}
