@@ -3,5 +3,8 @@
 #[doc = include_str!("formats.md")]
 pub mod formats {}
 
+#[doc = include_str!("quantities.md")]
+pub mod quantities {}
+
 #[doc = include_str!("recipes.md")]
 pub mod recipes {}
