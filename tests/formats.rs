@@ -685,11 +685,11 @@ fn formats_are_written_as_fast_as_plain_files() {
         encoding,
         points: false,
     };
-    println!(
+    eprintln!(
         "{:?}, {layers} layers, {band} voxels in the band, {threads} threads",
         grid.dims()
     );
-    println!(
+    eprintln!(
         "{:<12} {:>8} {:>8} {:>8} {:>6}",
         "format", "MB", "s", "plain s", "ratio"
     );
@@ -721,13 +721,13 @@ fn formats_are_written_as_fast_as_plain_files() {
             times[times.len() / 2][n]
         };
         let [own, twin] = [median(0), median(1)];
-        println!(
+        eprintln!(
             "{name:<12} {:>8.0} {own:>8.2} {twin:>8.2} {:>6.2}",
             bytes as f64 / 1e6,
             twin / own
         );
         if name == "vdb" {
-            println!("vdb: {:.1e} voxels of the band a second", band as f64 / own);
+            eprintln!("vdb: {:.1e} voxels of the band a second", band as f64 / own);
         }
     }
 }

@@ -81,16 +81,11 @@ pub(super) fn run(
     let grid = plan.grid;
     let what = "the process with the tables of its solids";
     let materials = materials(&scene, &plan)?;
-    let profiles = if plan.selection.has(Channel::ProfileParameter) {
-        scene.profile_curves()
-    } else {
-        Vec::new()
-    };
     let tables = || LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection);
     let sampler = (plan.budget)
         .while_watched(what, LESS, console, tables)
         .with_scalars(plan.scalars.clone())
-        .with_profiles(profiles)
+        .with_profiles(&scene)
         .with_materials(&materials)
         .with_cancel(&interrupted);
     interrupt::check()?;

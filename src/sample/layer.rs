@@ -10,6 +10,7 @@ use super::tally::{Certainty, FRACTION_ERROR, Tally};
 use crate::grid::{Channel, Channels, GridSpec};
 use crate::math::Kernel;
 use crate::region::CurveLocator;
+use crate::scene::Scene;
 use crate::solid::{Assembly, Body, Part, Scalar};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -237,9 +238,15 @@ impl<'a> LayerSampler<'a> {
         Self { scalars, ..self }
     }
 
-    /// A sampler that numbers curves by those of each part's profile.
+    /// A sampler of a scene's assembly that numbers the curves of profiles as the scene does; without,
+    /// [`Channel::ProfileParameter`] is -1 everywhere.
     #[must_use]
-    pub(crate) fn with_profiles(self, profiles: Vec<Option<Arc<CurveLocator>>>) -> Self {
+    pub fn with_profiles(self, scene: &Scene) -> Self {
+        let profiles = if self.selection.has(Channel::ProfileParameter) {
+            scene.profile_curves()
+        } else {
+            Vec::new()
+        };
         Self { profiles, ..self }
     }
 

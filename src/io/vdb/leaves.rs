@@ -198,7 +198,7 @@ impl Rule {
                     let [on, inside] = layer.map(|bits| bits >> (8 * x + y) & 1);
                     // Of a fog volume that is no tile, what is inside is a value as any other.
                     active[x] |= (on | (u64::from(fog) & inside)) << (8 * y + z);
-                    outside[x] |= (1 - inside & !on & 1) << (8 * y + z);
+                    outside[x] |= ((1 - inside) & !on & 1) << (8 * y + z);
                 }
             }
         }

@@ -163,7 +163,7 @@ fn equal_layers_give_equal_bytes() {
         many.insert(format!("user:attribute{n:02}"), Attribute::Int(n));
     }
     let list = layer.channels();
-    let mut reversed = list.clone();
+    let mut reversed = list;
     reversed.reverse();
     let first = encode_layer(SIZE, &list, &many, Compression::Zip).unwrap();
     for _ in 0..20 {
