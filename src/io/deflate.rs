@@ -2,18 +2,23 @@
 //!
 //! Source: Deutsch, RFC 1950 and RFC 1951.
 
+use std::cell::RefCell;
+
 use flate2::{Compress, Compression, FlushCompress, Status};
 
 /// Above it the files hardly become smaller; 5 and 6 are what VTK and gzip take.
 pub(super) const LEVEL: u32 = 6;
 
+thread_local! {
+    // Kept from piece to piece: a compressor's tables take a third of a mebibyte, and to make them anew for each piece
+    // leaves the heap in shreds.
+    static RAW: RefCell<Compress> = RefCell::new(Compress::new(Compression::new(LEVEL), false));
+    static ZLIB: RefCell<Compress> = RefCell::new(Compress::new(Compression::new(LEVEL), true));
+}
+
 /// A piece of raw deflate that ends at a byte and refers to nothing before it, so that pieces may follow each other.
 pub(super) fn piece(bytes: &[u8]) -> Vec<u8> {
-    deflated(
-        bytes,
-        Compress::new(Compression::new(LEVEL), false),
-        FlushCompress::Sync,
-    )
+    RAW.with_borrow_mut(|deflate| deflated(bytes, deflate, FlushCompress::Sync))
 }
 
 /// An empty last block, which ends a stream of pieces.
@@ -21,14 +26,11 @@ pub(super) const LAST: [u8; 2] = [3, 0];
 
 /// A zlib stream.
 pub(super) fn zlib(bytes: &[u8]) -> Vec<u8> {
-    deflated(
-        bytes,
-        Compress::new(Compression::new(LEVEL), true),
-        FlushCompress::Finish,
-    )
+    ZLIB.with_borrow_mut(|deflate| deflated(bytes, deflate, FlushCompress::Finish))
 }
 
-fn deflated(bytes: &[u8], mut deflate: Compress, flush: FlushCompress) -> Vec<u8> {
+fn deflated(bytes: &[u8], deflate: &mut Compress, flush: FlushCompress) -> Vec<u8> {
+    deflate.reset();
     let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
     loop {
         let done = deflate.total_in() as usize;

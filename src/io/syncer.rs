@@ -28,10 +28,30 @@ const WAITING: usize = 16;
 /// Syncs files in the background.
 #[derive(Debug)]
 pub(super) struct Syncer {
-    /// `None` once the threads are told to end.
-    queue: Option<SyncSender<Job>>,
+    queue: Queue,
     threads: Vec<JoinHandle<()>>,
     shared: Arc<Shared>,
+}
+
+/// Where jobs go; `None` once the threads are told to end.
+type Queue = Arc<Mutex<Option<SyncSender<Job>>>>;
+
+/// Has what is written of a large file go to the disk while the rest comes, so that not all is left for the end.
+#[derive(Debug, Clone)]
+pub(super) struct Ahead(Queue);
+
+impl Ahead {
+    /// Asks for it, if the threads have little to do.
+    pub(super) fn sync(&self, name: &str, file: &File) {
+        let queue = lock(&self.0);
+        if let (Some(queue), Ok(file)) = (queue.as_ref(), file.try_clone()) {
+            // What cannot be done now is done at the end.
+            let _ = queue.try_send(Job {
+                name: name.into(),
+                file,
+            });
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -87,7 +107,7 @@ impl Syncer {
             })
             .collect();
         Self {
-            queue: Some(queue),
+            queue: Arc::new(Mutex::new(Some(queue))),
             threads,
             shared,
         }
@@ -103,7 +123,9 @@ impl Syncer {
             name: name.into(),
             file,
         };
-        let refused = match &self.queue {
+        // Not held while the queue is full: others look at it.
+        let queue = lock(&self.queue).clone();
+        let refused = match queue {
             Some(queue) if !self.threads.is_empty() => queue.send(job).err().map(|e| e.0),
             _ => Some(job),
         };
@@ -116,12 +138,17 @@ impl Syncer {
         })
     }
 
+    /// What has parts of files synced ahead.
+    pub(super) fn ahead(&self) -> Ahead {
+        Ahead(Arc::clone(&self.queue))
+    }
+
     /// Waits until every file is on the disk.
     ///
     /// # Errors
     /// The first failure of any file.
     pub(super) fn finish(&mut self) -> Result<(), Failure> {
-        self.queue = None;
+        *lock(&self.queue) = None;
         for thread in self.threads.drain(..) {
             if thread.join().is_err() {
                 // Its files' fate is unknown, which is no better than a refusal.
@@ -244,7 +271,7 @@ mod tests {
     #[test]
     fn without_threads_files_are_synced_at_once() {
         let mut syncer = Syncer {
-            queue: None,
+            queue: Queue::default(),
             threads: Vec::new(),
             shared: Arc::default(),
         };

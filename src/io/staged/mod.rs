@@ -30,7 +30,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::ending;
 use super::error::IoError;
 use super::manifest;
-use super::syncer::{Failure, Syncer};
+use super::syncer::{Ahead, Failure, Syncer};
 
 /// Size and digest of a file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -209,6 +209,11 @@ impl StagedFiles {
     /// [`IoError::Write`] when the system has refused to sync one before it.
     pub(super) fn close(&self, staged: StagedFile) -> Result<(), IoError> {
         (self.syncer.sync(&staged.name, staged.file)).map_err(|failure| self.not_synced(failure))
+    }
+
+    /// What has parts of large files synced ahead.
+    fn ahead(&self) -> Ahead {
+        self.syncer.ahead()
     }
 
     /// A file for what is kept for a while: it has no name, and goes with its handle.
