@@ -143,7 +143,7 @@ pub(super) fn run(
             .selection
             .has(Channel::Fraction)
             .then_some(fraction_sum),
-        warnings: warnings(&scene, &plan.grid, Some(&tally)),
+        warnings: warnings(&scene, &plan, Some(&tally)),
         ..summary(&scene, &plan.selection, &plan.grid, Some(&tally))
     };
     let placed = Instant::now();
@@ -689,10 +689,11 @@ fn rounded_up(bound: f64) -> f64 {
     (bound / unit * (1.0 - 1e-9)).ceil() * unit
 }
 
-fn warnings(scene: &Scene, grid: &GridSpec, tally: Option<&Tally>) -> Vec<String> {
+fn warnings(scene: &Scene, plan: &Plan, tally: Option<&Tally>) -> Vec<String> {
     let volume = said_of_volume(scene).map(str::to_owned);
     let said = scene.warnings().iter().cloned();
-    said.chain(scene.grid_warning(grid))
+    said.chain(scene.grid_warning(&plan.grid))
+        .chain(plan.formats.warning(&plan.grid, &plan.channels))
         .chain(volume)
         .chain(tally.and_then(said_of_fractions))
         .collect()
@@ -846,7 +847,7 @@ fn document(
         "volume_exact_error": scene.volume_beside_sampling().map(|v| v.error),
         "seconds": seconds.map(|s| json!({ "prepare": s.prepare, "sample": s.sample, "write": s.write, "preview": s.preview, "total": s.total })),
         "peak_memory_bytes": memory::peak(),
-        "warnings": warnings(scene, &plan.grid, tally),
+        "warnings": warnings(scene, plan, tally),
     })
 }
 

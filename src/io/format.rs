@@ -5,18 +5,18 @@
 //!                                     Format::finish ─> FileRecords ──> manifest, commit
 //! ```
 //!
-//! A [`FormatKind`] says which format and how; [`begin`] makes the writers of a list of them. Each is a file or a folder
+//! A [`FormatKind`] says which format and how; `begin` makes the writers of a list of them. Each is a file or a folder
 //! of its own beside this one. All are told the same [`Description`], and each puts origin, spacing, units and the
 //! meaning of the sign where its readers look for them:
 //!
 //! | format | file | origin it gives | samples |
 //! |---|---|---|---|
-//! | [`exr`](super::exr) | a slice for each layer | corner, as an attribute | half, float, uint |
-//! | `vti` | one | corner for cells, first centre for points | as [`Element`] |
-//! | `npy`, `raw` | one for each channel, and `grid.json` | corner and first centre, in `grid.json` | as [`Element`] |
-//! | `nrrd`, `mhd` | one for each channel | first centre | as [`Element`] |
-//! | `zarr` | a tree | coordinate arrays of centres | as [`Element`] |
-//! | `h5` | one | corner, as attributes | as [`Element`] |
+//! | [`exr`] | a slice for each layer | corner, as an attribute | half, float, uint |
+//! | `vti` | one | corner for cells, first centre for points | u8, u32, f32 |
+//! | `npy`, `raw` | one for each channel, and `grid.json` | corner and first centre, in `grid.json` | u8, u32, f32 |
+//! | `nrrd`, `mhd` | one for each channel | first centre | u8, u32, f32 |
+//! | `zarr` | a tree | coordinate arrays of centres | u8, u32, f32 |
+//! | `h5` | one | corner, as attributes | u8, u32, f32 |
 //! | `vdb` | one | centre of index (0, 0, 0) | float |
 
 use std::borrow::Cow;

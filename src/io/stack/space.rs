@@ -57,7 +57,10 @@ impl StackSpace {
         summary: StackSummary,
         scene: &WriteScene<'_>,
     ) -> Result<Self, ExrError> {
+        /// Records that are written out to be measured; of more, all are taken to be as long on average.
+        const RECORDS: usize = 1 << 14;
         let layers = of.grid.dims()[2];
+        let shown = layers.min(RECORDS);
         let mut bytes = 0_u64;
         let mut files = Vec::new();
         let file = |name: String, layer: Option<usize>, bytes: u64| FileRecord {
@@ -71,7 +74,7 @@ impl StackSpace {
             if let FormatKind::Exr(_) = kind {
                 let slice = slice_bytes(of)?;
                 bytes = bytes.saturating_add(slice.saturating_mul(layers as u64));
-                files.extend((0..layers).map(|k| file(slice_name(k, layers), Some(k), slice)));
+                files.extend((0..shown).map(|k| file(slice_name(k, layers), Some(k), slice)));
             } else {
                 let all = kind.needs(of).disk;
                 bytes = bytes.saturating_add(all);
@@ -79,15 +82,22 @@ impl StackSpace {
                 files.extend(of.channels.iter().map(|c| file(name(c), None, all)));
             }
         }
+        let files_of_layers = kinds.iter().any(|kind| matches!(kind, FormatKind::Exr(_)));
         let totals: Vec<Statistics> = (of.channels.iter())
             .map(|c| Statistics::likely(c, of.grid.voxel_count()))
             .collect();
         let contents = Contents { of, kinds };
         let manifest = contents.manifest(files, &totals, summary);
         let manifest = manifest.length_with(scene);
+        let manifest = manifest.map_err(|reason| ExrError::Encode { reason })?;
+        let times = if files_of_layers {
+            layers.div_ceil(shown)
+        } else {
+            1
+        };
         Ok(Self {
             files: bytes,
-            beside: manifest.map_err(|reason| ExrError::Encode { reason })?,
+            beside: manifest.saturating_mul(times as u64),
         })
     }
 

@@ -29,7 +29,11 @@ impl FixedFile {
         length: u64,
     ) -> Result<Self, IoError> {
         let staged = files.create(name)?;
-        (staged.file().set_len(length)).map_err(|source| staged.failed(source))?;
+        if let Err(source) = staged.file().set_len(length) {
+            // Another thread may try again, to be told the same.
+            files.forget(name);
+            return Err(staged.failed(source));
+        }
         Ok(Self {
             staged,
             digest: PlaceDigest::new(length),

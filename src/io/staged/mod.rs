@@ -177,7 +177,7 @@ impl StagedFiles {
         is_there(&path).then_some(path)
     }
 
-    fn forget(&self, name: &str) {
+    pub(super) fn forget(&self, name: &str) {
         // A partial file must not be there to be renamed; its name is free again.
         let _ = fs::remove_file(self.place.join(name));
         self.taken().remove(&name.to_lowercase());
