@@ -61,6 +61,8 @@ struct Seconds {
     total: f64,
 }
 
+/// What may outgrow the memory.
+const TABLES: &str = "the process with the tables of its solids";
 /// What takes less memory.
 const LESS: &str = "lower the resolution or choose fewer channels";
 
@@ -75,17 +77,17 @@ pub(super) fn run(
     for warning in scene.warnings() {
         console.warn(warning);
     }
-    let mut plan = plan(&scene, arguments, common.kernel()?)?;
+    let mut plan = plan(&scene, arguments, common.kernel()?, console)?;
     let interrupted = || interrupt::check().is_err();
     let grid = plan.grid;
-    let what = "the process with the tables of its solids";
     let tables = || LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection);
     let sampler = (plan.budget)
-        .while_watched(what, LESS, console, tables)
+        .while_watched(TABLES, LESS, console, tables)
         .with_scalars(plan.scalars.clone())
         .with_cancel(&interrupted);
     interrupt::check()?;
     // The tables are there: what is missing is known.
+    plan.budget.expect_none();
     plan.layer_bytes = (plan.layer_bytes).saturating_add(sampler.bytes_per_thread());
     plan.workers = plan.room()?;
     if let Some(warning) = scene.grid_warning(&plan.grid) {
@@ -254,7 +256,12 @@ fn fraction_error(arguments: &Voxelize) -> Result<Option<f64>, Failure> {
     }
 }
 
-fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Failure> {
+fn plan(
+    scene: &Scene,
+    arguments: &Voxelize,
+    kernel: Kernel,
+    console: &Console,
+) -> Result<Plan, Failure> {
     let grid = scene.grid()?;
     let output = &scene.model().output;
     let units = scene.model().units.name();
@@ -297,7 +304,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         path: arguments.output.clone(),
         error,
     })?;
-    let plan = Plan {
+    let mut plan = Plan {
         grid,
         selection,
         kernel,
@@ -311,6 +318,11 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         space,
         expected_bytes: (compression == Compression::None).then_some(space.uncompressed()),
     };
+    if (plan.budget).is_tight(plan.fixed_bytes.saturating_add(plan.layer_bytes)) {
+        let (coarse, times) = memory::coarser(&grid);
+        let make = || LayerSampler::with_kernel(kernel, scene.assembly(), &coarse, selection);
+        plan.budget.expect((TABLES, LESS), console, times, make);
+    }
     // What is too large without its tables is not worth making them.
     plan.room()?;
     refuse_beyond(&arguments.output, least_bytes(&plan), 0)?;
