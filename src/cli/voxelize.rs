@@ -87,7 +87,7 @@ pub(super) fn run(
         .with_cancel(&interrupted);
     interrupt::check()?;
     // The tables are there: what is missing is known.
-    plan.budget.expect_none();
+    plan.budget.expect(0);
     plan.layer_bytes = (plan.layer_bytes).saturating_add(sampler.bytes_per_thread());
     plan.workers = plan.room()?;
     if let Some(warning) = scene.grid_warning(&plan.grid) {
@@ -319,9 +319,17 @@ fn plan(
         expected_bytes: (compression == Compression::None).then_some(space.uncompressed()),
     };
     if (plan.budget).is_tight(plan.fixed_bytes.saturating_add(plan.layer_bytes)) {
-        let (coarse, times) = memory::coarser(&grid);
-        let make = || LayerSampler::with_kernel(kernel, scene.assembly(), &coarse, selection);
-        plan.budget.expect((TABLES, LESS), console, times, make);
+        let times = memory::coarser(&grid);
+        let taken = |times: usize| {
+            let coarse = memory::coarse(&grid, times);
+            let make = || LayerSampler::with_kernel(kernel, scene.assembly(), &coarse, selection);
+            plan.budget.taken_by((TABLES, LESS), console, make)
+        };
+        let fine = taken(times);
+        // Those of the grid itself tell all.
+        let coarse = if times > 1 { taken(2 * times) } else { fine };
+        let tables = memory::grown(times as u64, [fine, coarse]);
+        plan.budget.expect(tables);
     }
     // What is too large without its tables is not worth making them.
     plan.room()?;
