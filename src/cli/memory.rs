@@ -11,11 +11,13 @@
 //! would do. The values do not depend on the limit: only how many layers are under way at the same time does.
 //!
 //! What tables take is known when they are made. While they are, a thread looks at the process every millisecond, and
-//! refuses the run where they outgrow the limit: before anything is written.
+//! refuses the run where they outgrow the limit: before anything is written. So that a refusal names what is enough, those
+//! of a coarser grid are made where the limit is low.
 
 use super::failure::Failure;
 use super::output::Console;
 use crate::error::Error;
+use crate::grid::GridSpec;
 use crate::io::ending;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -29,6 +31,12 @@ const SPARE_PER_WORKER: u64 = 1 << 19;
 const LOOK: Duration = Duration::from_millis(1);
 /// How long the refusal waits for files that are being renamed: there are none yet.
 const PATIENCE: Duration = Duration::from_millis(100);
+/// What a refusal names beside what is needed: a process has up to some MiB more or less another time.
+const ANOTHER_TIME: u64 = 4 << 20;
+/// Sides of the grid whose tables tell of those of a finer one, in voxels.
+const TOLD_BY: usize = 512;
+/// What tables take while they are made, in halves of what is left of them.
+const MAKING: u64 = 5;
 /// What a process is taken to have where the system does not tell.
 const UNTOLD: u64 = 24 << 20;
 
@@ -36,6 +44,8 @@ const UNTOLD: u64 = 24 << 20;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget {
     limit: u64,
+    /// Bytes of tables that are to be made, as far as they are expected.
+    tables: u64,
 }
 
 /// What a run will take beside what the process has.
@@ -56,7 +66,20 @@ impl Budget {
     pub(super) fn new(limit: Option<u64>) -> Self {
         Self {
             limit: limit.unwrap_or_else(default_limit),
+            tables: 0,
         }
+    }
+
+    /// Expects tables of so many bytes to be made: a refusal names what is enough for them, too.
+    pub(super) fn expect(&mut self, tables: u64) {
+        self.tables = tables;
+    }
+
+    /// Whether the limit is so low that it may not do for what is needed and its tables.
+    pub(super) fn is_tight(&self, needed: u64) -> bool {
+        /// Larger tables than this are those of grids that need much memory for their layers.
+        const LARGE: u64 = 256 << 20;
+        self.limit < needed.saturating_mul(2).saturating_add(LARGE)
     }
 
     /// Workers that there is room for, `most` at most.
@@ -64,20 +87,49 @@ impl Budget {
     /// # Errors
     /// [`Error::TooLarge`] where there is no room for one, with what would do.
     pub(super) fn workers(&self, need: &Need<'_>, most: usize) -> Result<usize, Error> {
-        let found = within(self.limit, Process::now(), need, most);
-        found.map_err(|needed| Error::TooLarge {
-            what: need.what.to_owned(),
-            needed,
-            available: self.limit,
-            remedy: format!(
-                "raise --memory-limit to {needed} bytes or more, or {}",
-                need.remedy
-            ),
+        let process = Process::now();
+        let found = within(self.limit, process, need, most);
+        found.map_err(|needed| {
+            let needed = self.named(process, needed);
+            Error::TooLarge {
+                what: need.what.to_owned(),
+                needed,
+                available: self.limit,
+                remedy: format!(
+                    "raise --memory-limit to {needed} bytes or more, or {}",
+                    need.remedy
+                ),
+            }
         })
+    }
+
+    /// What a refusal names as enough, where so much is needed but for tables to be made.
+    fn named(&self, process: Process, needed: u64) -> u64 {
+        let making = (self.tables / 2).saturating_mul(MAKING);
+        let making = process.resident.saturating_add(making);
+        (needed.saturating_add(self.tables).max(making)).saturating_add(ANOTHER_TIME)
     }
 }
 
 impl Budget {
+    /// Makes tables that tell of others, and lets go of them: the bytes that they have taken. Where they outgrow the limit,
+    /// or take more than a little where it is too low in any case, the process ends with a refusal.
+    pub(super) fn taken_by<T>(
+        &self,
+        (what, remedy): (&'static str, &'static str),
+        console: &Console,
+        make: impl FnOnce() -> T,
+    ) -> u64 {
+        /// What the tables of ordinary solids take, and more.
+        const LITTLE: u64 = 24 << 20;
+        let before = resident().unwrap_or(UNTOLD);
+        let most = self.limit.max(before.saturating_add(LITTLE));
+        let made = self.watched_below(most, (what, remedy), console, make);
+        let taken = resident().unwrap_or(UNTOLD).saturating_sub(before);
+        drop(made);
+        taken
+    }
+
     /// Makes what nobody knows the size of beforehand. Where it outgrows the limit the process ends with a refusal.
     pub(super) fn while_watched<T>(
         &self,
@@ -86,13 +138,25 @@ impl Budget {
         console: &Console,
         make: impl FnOnce() -> T,
     ) -> T {
+        self.watched_below(self.limit, (what, remedy), console, make)
+    }
+
+    fn watched_below<T>(
+        &self,
+        most: u64,
+        (what, remedy): (&'static str, &'static str),
+        console: &Console,
+        make: impl FnOnce() -> T,
+    ) -> T {
         let (done, told) = channel::<()>();
         let (limit, console) = (self.limit, *console);
+        let expected = self.named(Process::now(), 0);
         let watch = move || {
             while told.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
                 match resident() {
-                    Some(bytes) if bytes > limit.saturating_sub(SPARE / 2) => {
-                        refuse(what, remedy, bytes.saturating_add(SPARE), limit, &console)
+                    Some(bytes) if bytes > most.saturating_sub(SPARE / 2) => {
+                        let least = bytes.saturating_add(SPARE).max(expected);
+                        refuse(what, remedy, least, limit, &console)
                     }
                     Some(_) => {}
                     None => break,
@@ -107,6 +171,32 @@ impl Budget {
         let _ = watcher.map(std::thread::JoinHandle::join);
         made
     }
+}
+
+/// How many times as coarse a grid is whose tables tell of this one's.
+pub(super) fn coarser(grid: &GridSpec) -> usize {
+    let widest = grid.dims().into_iter().max().unwrap_or(1);
+    widest.div_ceil(TOLD_BY)
+}
+
+/// The same region in so many times as large voxels.
+pub(super) fn coarse(grid: &GridSpec, times: usize) -> GridSpec {
+    let dims = grid.dims().map(|n| n.div_ceil(times));
+    #[allow(clippy::cast_precision_loss, reason = "a small number")]
+    let spacing = grid.spacing() * times as f64;
+    GridSpec::new(dims, grid.origin(), spacing).unwrap_or(*grid)
+}
+
+/// What tables of a grid may take, by what those of one so many `times` as coarse take, and those of one twice as coarse
+/// again: some of a table grows with the square of the steps, as it covers a half-plane, and some, along curves in it,
+/// with their number.
+pub(super) fn grown(times: u64, [fine, coarse]: [u64; 2]) -> u64 {
+    // fine = linear + square, coarse = linear / 2 + square / 4
+    let square = (2 * fine).saturating_sub(4 * coarse).min(fine);
+    let linear = fine - square;
+    let grown = (linear.saturating_mul(times)).saturating_add(square.saturating_mul(times * times));
+    // Of small tables the system tells roughly.
+    grown.saturating_add(grown / 4)
 }
 
 /// Says that the run takes more than there is, and ends the process.
@@ -206,6 +296,18 @@ mod tests {
             assert!(within(room, process, &need, 8).is_ok_and(|n| (4..=8).contains(&n)));
             assert_eq!(within(u64::MAX, process, &need, 8), Ok(8));
         }
+    }
+
+    #[test]
+    fn tables_grow_between_linearly_and_with_the_square() {
+        let grown = |times, told| grown(times, told) * 4 / 5;
+        assert_eq!(grown(1, [1000, 300]), 1000);
+        assert_eq!(grown(4, [1000, 500]), 4000);
+        assert_eq!(grown(4, [1000, 250]), 16_000);
+        assert_eq!(grown(4, [1000, 400]), 2400 + 6400);
+        // Beyond either: what is told is rounded.
+        assert_eq!(grown(4, [1000, 100]), 16_000);
+        assert_eq!(grown(4, [1000, 900]), 4000);
     }
 
     #[test]

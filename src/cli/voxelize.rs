@@ -62,6 +62,8 @@ struct Seconds {
     total: f64,
 }
 
+/// What may outgrow the memory.
+const TABLES: &str = "the process with the tables of its solids";
 /// What takes less memory.
 const LESS: &str = "lower the resolution or choose fewer channels";
 
@@ -76,20 +78,20 @@ pub(super) fn run(
     for warning in scene.warnings() {
         console.warn(warning);
     }
-    let mut plan = plan(&scene, arguments, common.kernel()?)?;
+    let mut plan = plan(&scene, arguments, common.kernel()?, console)?;
     let interrupted = || interrupt::check().is_err();
     let grid = plan.grid;
-    let what = "the process with the tables of its solids";
     let materials = materials(&scene, &plan)?;
     let tables = || LayerSampler::with_kernel(plan.kernel, scene.assembly(), &grid, plan.selection);
     let sampler = (plan.budget)
-        .while_watched(what, LESS, console, tables)
+        .while_watched(TABLES, LESS, console, tables)
         .with_scalars(plan.scalars.clone())
         .with_profiles(&scene)
         .with_materials(&materials)
         .with_cancel(&interrupted);
     interrupt::check()?;
     // The tables are there: what is missing is known.
+    plan.budget.expect(0);
     plan.layer_bytes = (plan.layer_bytes).saturating_add(sampler.bytes_per_thread());
     plan.workers = plan.room()?;
     if let Some(warning) = scene.grid_warning(&plan.grid) {
@@ -278,7 +280,12 @@ fn fraction_error(arguments: &Voxelize) -> Result<Option<f64>, Failure> {
     }
 }
 
-fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Failure> {
+fn plan(
+    scene: &Scene,
+    arguments: &Voxelize,
+    kernel: Kernel,
+    console: &Console,
+) -> Result<Plan, Failure> {
     let grid = scene.grid()?;
     let output = &scene.model().output;
     let units = scene.model().units.name();
@@ -315,7 +322,7 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
     let sampled = sampled.saturating_add(of_material);
     let layer_bytes = layer_bytes(&grid, sampled, scalars.len(), &formats);
     let space = space(scene, arguments, &grid, (&selection, &channels), &formats)?;
-    let plan = Plan {
+    let mut plan = Plan {
         grid,
         selection,
         kernel,
@@ -331,6 +338,19 @@ fn plan(scene: &Scene, arguments: &Voxelize, kernel: Kernel) -> Result<Plan, Fai
         expected_bytes: formats.needs.disk_is_sure.then_some(space.uncompressed()),
         formats,
     };
+    if (plan.budget).is_tight(plan.fixed_bytes.saturating_add(plan.layer_bytes)) {
+        let times = memory::coarser(&grid);
+        let taken = |times: usize| {
+            let coarse = memory::coarse(&grid, times);
+            let make = || LayerSampler::with_kernel(kernel, scene.assembly(), &coarse, selection);
+            plan.budget.taken_by((TABLES, LESS), console, make)
+        };
+        let fine = taken(times);
+        // Those of the grid itself tell all.
+        let coarse = if times > 1 { taken(2 * times) } else { fine };
+        let tables = memory::grown(times as u64, [fine, coarse]);
+        plan.budget.expect(tables);
+    }
     // What is too large without its tables is not worth making them.
     plan.room()?;
     refuse_beyond(&arguments.output, least_bytes(&plan), 0)?;

@@ -53,7 +53,14 @@ pub fn write_file_atomically(
             _ => Ok(()),
         }
     };
-    attempt().map_err(IoError::write(path))
+    attempt().map_err(|error| IoError::write(path)(own(error)))
+}
+
+/// The system's own error: what wraps it names a file that is nobody's business, and gone.
+fn own(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(std::error::Error::source);
+    let code = inner.and_then(|e| e.downcast_ref::<io::Error>()?.raw_os_error());
+    code.map_or(error, io::Error::from_raw_os_error)
 }
 
 /// What the names of temporary files for `target` begin with: the same in each run, and short whatever its name.

@@ -57,7 +57,7 @@ pub enum MeshError {
     },
     /// A chord error that takes too many triangles.
     #[error(
-        "the chord error {found:e} takes about {triangles:.3e} triangles, and the limit is {limit}; choose a larger chord error"
+        "the chord error {found:e} takes about {triangles:.3e} triangles, and the limit is {limit}; a larger chord error may do"
     )]
     TooManyTriangles {
         /// The chord error given, in scene units.
