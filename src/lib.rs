@@ -59,7 +59,8 @@
 //! * [`validate`]: the exact answers held against the triangles, the field against what a distance is.
 //! * [`converge`]: how the samples approach the solid as voxels become smaller.
 //! * [`picture`]: shaded views, sections and contact sheets, from the exact distance.
-//! * [`io`]: the EXR stack with its manifest, tables of points, files of triangles; it knows no geometry.
+//! * [`io`]: stacks in nine formats with their manifest, tables of points, files of triangles; it knows no geometry.
+//! * [`guide`]: pages for users of the command.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
 //!
 //! A volume goes the whole way in a few lines: made by construction, written and read, turned into a scene, asked.

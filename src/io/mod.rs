@@ -1,13 +1,14 @@
-//! Files: the EXR stack with its manifest, the points of a query, and meshes.
+//! Files: stacks of layers in any of nine formats with their manifest, the points of a query, and meshes.
 //!
 //! ```text
-//!   layers ──> exr (bytes of one slice) ──> directory (staged, synced)
-//!                                               │ commit: one exchange, or renames by a journal
+//!   layers ──> format: exr, vti, npy, nrrd, mhd, raw, zarr, vdb, h5 ──> staged (synced, digested)
+//!                                               │ directory: one exchange, or renames by a journal
 //!                                               v
-//!   DIR/slice-0000.exr  DIR/slice-0001.exr  ...  DIR/manifest.json
+//!   DIR/slice-0000.exr  DIR/slice-0001.exr  ...  DIR/NAME.vti  ...  DIR/manifest.json
 //! ```
 //!
-//! [`stack`] is the whole path in one type, [`verify`] the way back, [`points`] the tables that
+//! [`stack`] is the whole path in one type, [`format`](mod@format) the door that all formats stand behind, [`output`] one
+//! file without a manifest, [`verify`] the way back, [`points`] the tables that
 //! `query` reads and writes, [`mesh`] the files of triangles. Nothing here knows geometry or scenes, only grids and bytes.
 //!
 //! Equal input gives equal bytes: no times, no random names, no map order reaches a file. A file

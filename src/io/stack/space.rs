@@ -86,6 +86,13 @@ impl StackSpace {
         let totals: Vec<Statistics> = (of.channels.iter())
             .map(|c| Statistics::likely(c, of.grid.voxel_count()))
             .collect();
+        // The grid of as many layers: a manifest lists them all.
+        let [nx, ny, _] = of.grid.dims();
+        let lower = GridSpec::new([nx, ny, shown], of.grid.origin(), of.grid.spacing());
+        let of = &Description {
+            grid: lower.unwrap_or(of.grid),
+            ..of.clone()
+        };
         let contents = Contents { of, kinds };
         let manifest = contents.manifest(files, &totals, summary);
         let manifest = manifest.length_with(scene);
