@@ -232,13 +232,16 @@ fn grid() -> Value {
 fn channel() -> Value {
     let mut known = names("A channel.", Channel::ALL.iter().map(|n| n.name()));
     known["description"] = json!("A channel of every scene.");
-    choice(
-        "A channel.",
-        json!([
+    // A known name is a name, too: not one of the two alone.
+    json!({
+        "description": "A channel.",
+        "anyOf": [
             known,
-            name("A parameter u, v, w or a field of the scene's volumes.")
-        ]),
-    )
+            name(
+                "The share of a material, as fraction-1; or a parameter u, v, w or a field of the scene's volumes."
+            ),
+        ],
+    })
 }
 
 fn output() -> Value {
