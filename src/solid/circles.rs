@@ -661,7 +661,10 @@ mod tests {
                     let touching = a.sides.iter().zip(&b.sides);
                     let touching = touching.flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]);
                     let touching = touching.fold(0.0, |m: f64, off| m.max(off.abs()));
-                    assert!(touching <= 1e-5, "{text}: sides of {centre}: {a:?}\n{b:?}");
+                    assert!(
+                        touching <= 1e-5 + b.error,
+                        "{text}: sides of {centre}: {a:?}\n{b:?}"
+                    );
                     let within = a.error + b.error + 1e-11 + touching;
                     let face = [sides.y * sides.z, sides.z * sides.x, sides.x * sides.y];
                     let largest = face[0].max(face[1]).max(face[2]);

@@ -1,6 +1,7 @@
 //! Solids and grids that are refused.
 
 use super::*;
+use crate::grid::Channel;
 
 #[test]
 fn solids_are_checked() {
@@ -103,8 +104,14 @@ fn grids_are_checked() {
     );
     refuses(
         &format!("{SMALL}[output]\nchannels = [\"sfd\"]\n"),
-        "vase.toml:10:13: output.channels[0]: found \"sfd\", wanted one of occupancy, fraction, sdf, \
-         material; did you mean `sdf`?",
+        &format!(
+            "vase.toml:10:13: output.channels[0]: found \"sfd\", wanted one of {}, fraction-1; did you mean `sdf`?",
+            Channel::ALL
+                .iter()
+                .map(|c| c.name())
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
     );
     refuses(
         &format!("{SMALL}[materials]\n0 = \"air\"\n"),
