@@ -631,7 +631,7 @@ mod tests {
             let mut state = 1_u64;
             let mut compared = 0;
             let (mut worst, mut chords) = (0.0_f64, 0.0_f64);
-            while compared < 12 {
+            while compared < 4 {
                 state = state
                     .wrapping_mul(6_364_136_223_846_793_005)
                     .wrapping_add(1);
