@@ -102,7 +102,7 @@ impl Crossed<'_> {
         );
         let largest = faces.max_element();
         for (order, found) in orders.into_iter().zip(&mut volumes) {
-            self.work.set(0);
+            self.rows.set(0);
             let sums = panels::integrals::<Kit, KIT>(self, order, tolerance);
             found.copy_from_slice(&sums[..4]);
             let along = order[0];

@@ -21,8 +21,7 @@
 //!
 //! * Error: the distance of two answers, of rows along different directions, beside that of nested rules on the integrals
 //!   between cuts, which are analytic there; square roots at cuts are
-//!   smoothed by a substitution. Surfaces that all but coincide change places all over: where the tolerance takes much
-//!   work it is raised step by step, and the error says so.
+//!   smoothed by a substitution. Where rows run out before the estimates are small the error says so.
 
 mod kit;
 mod panels;
@@ -53,8 +52,8 @@ const BRANCHES: u32 = 64;
 const SIDE: [u32; 2] = [0, 1];
 /// Places along a row nearer than this, in voxels, count as one.
 const TINY: f64 = 1e-12;
-/// Surfaces asked, all rows together, after which an estimate is taken as it is: some hundredths of a second's work.
-const MOST_WORK: u64 = 1 << 21;
+/// Rows after which an estimate is taken as it is: some hundredths of a second's work.
+const MOST_ROWS: u64 = 1 << 18;
 
 /// What is inside of one solid that a body is made of: a row that no surface of it crosses is wholly in it or not.
 enum Whole<'a> {
@@ -112,8 +111,7 @@ pub(crate) struct Crossed<'a> {
     tiny: f64,
     /// What places are rounded to.
     rounding: f64,
-    /// Surfaces asked so far.
-    work: Cell<u64>,
+    rows: Cell<u64>,
 }
 
 /// A row through the voxel.
@@ -182,7 +180,7 @@ impl<'a> Crossed<'a> {
             cell: sides,
             tiny: TINY,
             rounding: 16.0 * f64::EPSILON,
-            work: Cell::new(0),
+            rows: Cell::new(0),
         };
         let mut labels = BRANCHES;
         for &number in &numbers {
@@ -419,15 +417,13 @@ impl<'a> Crossed<'a> {
 
     /// What a line is in the voxel.
     fn row<S: Sums<N>, const N: usize>(&self, line: Line) -> Row<N> {
-        let mut asked = 1;
+        self.rows.set(self.rows.get() + 1);
         let mut events: SmallVec<[Event; 24]> = SmallVec::new();
         for part in &self.parts {
-            asked += part.surfaces.len() as u64;
             for surface in &part.surfaces {
                 surface.crossings(&part.affine, part.aligned.as_ref(), line, &mut events);
             }
         }
-        self.work.set(self.work.get() + asked);
         self.sort(&mut events);
         if S::SIDES {
             events.sort_by_key(|event| self.reaches_side(event, line.along, true));
@@ -692,7 +688,7 @@ impl<'a> Crossed<'a> {
             error: 0.5,
         };
         for order in orders {
-            self.work.set(0);
+            self.rows.set(0);
             let [one] = panels::integrals::<Length, 1>(self, order, tolerance);
             for other in &found {
                 let error = (one.value - other.value).abs() + one.error.min(other.error);

@@ -2,7 +2,7 @@
 
 use super::places::{Family, Places};
 use super::sheet::{Line, zero};
-use super::{BRANCHES, Crossed, MOST_WORK, Row, SIDE, Sums};
+use super::{BRANCHES, Crossed, MOST_ROWS, Row, SIDE, Sums};
 use crate::math::quadrature::{FIFTEEN, Integral, Nested, SEVEN, graded, points};
 use smallvec::SmallVec;
 
@@ -122,19 +122,7 @@ impl Crossed<'_> {
     }
 
     fn is_spent(&self) -> bool {
-        self.work.get() > MOST_WORK
-    }
-
-    /// Eighths of the work that are done.
-    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
-    fn eighths(&self) -> usize {
-        (8 * self.work.get() / MOST_WORK) as usize
-    }
-
-    /// How many times the tolerance is enough by now: more from half of the work on.
-    fn leeway(&self) -> f64 {
-        const BY_EIGHTHS: [f64; 8] = [1.0, 1.0, 1.0, 1.0, 1e2, 1e4, 1e6, 1e7];
-        BY_EIGHTHS[self.eighths().min(7)]
+        self.rows.get() > MOST_ROWS
     }
 }
 
@@ -201,8 +189,7 @@ pub(super) fn integrals<S: Sums<N>, const N: usize>(
             changes::<S, N>(voxel, family, &mut places);
         }
     }
-    let mut work = stretches(places);
-    let mut is_joined = false;
+    let mut work: Vec<Stretch> = stretches(places).into_vec();
     let mut total = Sum::<N>::default();
     let slice = |at: f64| {
         let mut through = [0.0; 3];
@@ -215,12 +202,6 @@ pub(super) fn integrals<S: Sums<N>, const N: usize>(
         area::<S, N>(voxel, family, INNER * tolerance)
     };
     while let Some(stretch) = work.pop() {
-        if voxel.is_spent() && !is_joined {
-            work.push(stretch);
-            join(&mut work);
-            is_joined = true;
-            continue;
-        }
         if stretch.width() <= NARROW {
             total.doubt(stretch.width());
             continue;
@@ -234,20 +215,6 @@ pub(super) fn integrals<S: Sums<N>, const N: usize>(
         value: total.values[n],
         error: total.errors[n],
     })
-}
-
-/// Makes one of stretches that follow each other, in falling order: what is left where the work is spent, however many
-/// stretches it is in.
-fn join(work: &mut SmallVec<[Stretch; 24]>) {
-    work.sort_unstable_by(|a, b| b.ends[0].total_cmp(&a.ends[0]));
-    work.dedup_by(|low, high| {
-        let follow = low.ends[1] == high.ends[0];
-        if follow {
-            high.ends[0] = low.ends[0];
-            high.graded = [false; 2];
-        }
-        follow
-    });
 }
 
 const SIDE_PLACES: [f64; 2] = [-0.5, 0.5];
@@ -267,13 +234,13 @@ fn of_planes<const N: usize>(
     slice: &impl Fn(f64) -> Slice<N>,
 ) -> Result<Sum<N>, [Stretch; 2]> {
     let last = stretch.depth >= DEPTH || voxel.is_spent();
-    let tolerance = (tolerance * voxel.leeway()).max(voxel.rounding);
+    let tolerance = tolerance.max(voxel.rounding);
     let quick = planes_by(&SEVEN, stretch, tolerance, slice, last)?;
-    if quick.error() <= tolerance || last {
+    if quick.error() <= tolerance {
         return Ok(quick);
     }
     let long = planes_by(&FIFTEEN, stretch, tolerance, slice, last)?;
-    if long.error() <= tolerance {
+    if long.error() <= tolerance || last {
         return Ok(long);
     }
     let middle = 0.5 * (stretch.ends[0] + stretch.ends[1]);
@@ -396,22 +363,11 @@ fn change_of_planes<const N: usize>(
 
 /// The sums over the rows of a plane.
 fn area<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, tolerance: f64) -> Slice<N> {
-    let mut is_joined = voxel.is_spent();
-    let mut work = if is_joined {
-        stretches(Places::new())
-    } else {
-        voxel.changes_alone::<S, N>(family)
-    };
+    let mut work = voxel.changes_alone::<S, N>(family);
     work.reverse();
     let mut found = Slice::default();
     let mut before: Option<SmallVec<[u32; 12]>> = None;
     while let Some(stretch) = work.pop() {
-        if voxel.is_spent() && !is_joined {
-            work.push(stretch);
-            join(&mut work);
-            is_joined = true;
-            continue;
-        }
         if stretch.width() <= NARROW {
             found.sum.doubt(stretch.width());
             continue;
@@ -476,13 +432,13 @@ fn of_rows<S: Sums<N>, const N: usize>(
     tolerance: f64,
 ) -> Result<(Sum<N>, Ends), [Stretch; 2]> {
     let last = stretch.depth >= DEPTH || voxel.is_spent();
-    let tolerance = (tolerance * voxel.leeway()).max(voxel.rounding * stretch.width());
+    let tolerance = tolerance.max(voxel.rounding * stretch.width());
     let (quick, ends) = rows_by::<S, 7, N>(&SEVEN, voxel, family, stretch, tolerance, last)?;
-    if quick.error() <= tolerance || last {
+    if quick.error() <= tolerance {
         return Ok((quick, ends));
     }
     let (long, ends) = rows_by::<S, 15, N>(&FIFTEEN, voxel, family, stretch, tolerance, last)?;
-    if long.error() <= tolerance {
+    if long.error() <= tolerance || last {
         return Ok((long, ends));
     }
     let middle = 0.5 * (stretch.ends[0] + stretch.ends[1]);
@@ -736,7 +692,7 @@ fn change_of_rows<S: Sums<N>, const N: usize>(
     (0.5 * (a + b), true)
 }
 
-/// Adds the places at which the intervals of a family's rows change, as long as there is work left for others.
+/// Adds the places at which the intervals of a family's rows change.
 fn changes<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, out: &mut Places) {
     let alone = voxel.changes_alone::<S, N>(family);
     for stretch in &alone[1..] {
@@ -746,9 +702,6 @@ fn changes<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, out: &mu
     while let Some(stretch) = work.pop() {
         if stretch.width() <= NARROW || stretch.depth >= DEPTH {
             continue;
-        }
-        if voxel.eighths() > 0 {
-            return;
         }
         let us = points(&SEVEN);
         let rows: SmallVec<[Row<N>; 15]> = us
