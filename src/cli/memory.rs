@@ -70,9 +70,9 @@ impl Budget {
         }
     }
 
-    /// Expects tables of so many bytes to be made: a refusal names what is enough for them, too.
-    pub(super) fn expect(&mut self, tables: u64) {
-        self.tables = tables;
+    /// The tables are made: none are expected any more.
+    pub(super) fn expect_none(&mut self) {
+        self.tables = 0;
     }
 
     /// Whether the limit is so low that it may not do for what is needed and its tables.
@@ -112,22 +112,24 @@ impl Budget {
 }
 
 impl Budget {
-    /// Makes tables that tell of others, and lets go of them: the bytes that they have taken. Where they outgrow the limit,
-    /// or take more than a little where it is too low in any case, the process ends with a refusal.
-    pub(super) fn taken_by<T>(
-        &self,
+    /// Makes tables of a grid that tells of a finer one's, those of which may take so many `times` as much: what these
+    /// are expected to take. Where they outgrow the limit, or take more than a little where it is too low in any case,
+    /// the process ends with a refusal.
+    pub(super) fn expect<T>(
+        &mut self,
         (what, remedy): (&'static str, &'static str),
         console: &Console,
+        times: u64,
         make: impl FnOnce() -> T,
-    ) -> u64 {
-        /// What the tables of ordinary solids take, and more.
+    ) {
+        /// What the coarse tables of ordinary solids take, and more.
         const LITTLE: u64 = 24 << 20;
         let before = resident().unwrap_or(UNTOLD);
         let most = self.limit.max(before.saturating_add(LITTLE));
         let made = self.watched_below(most, (what, remedy), console, make);
         let taken = resident().unwrap_or(UNTOLD).saturating_sub(before);
         drop(made);
-        taken
+        self.tables = taken.saturating_mul(times);
     }
 
     /// Makes what nobody knows the size of beforehand. Where it outgrows the limit the process ends with a refusal.
@@ -173,30 +175,16 @@ impl Budget {
     }
 }
 
-/// How many times as coarse a grid is whose tables tell of this one's.
-pub(super) fn coarser(grid: &GridSpec) -> usize {
+/// The grid, or one a few times as coarse, and how many times the tables of the one may take what those of the other do:
+/// they cover a half-plane, so they grow by no more than the square.
+pub(super) fn coarser(grid: &GridSpec) -> (GridSpec, u64) {
     let widest = grid.dims().into_iter().max().unwrap_or(1);
-    widest.div_ceil(TOLD_BY)
-}
-
-/// The same region in so many times as large voxels.
-pub(super) fn coarse(grid: &GridSpec, times: usize) -> GridSpec {
+    let times = widest.div_ceil(TOLD_BY);
     let dims = grid.dims().map(|n| n.div_ceil(times));
     #[allow(clippy::cast_precision_loss, reason = "a small number")]
     let spacing = grid.spacing() * times as f64;
-    GridSpec::new(dims, grid.origin(), spacing).unwrap_or(*grid)
-}
-
-/// What tables of a grid may take, by what those of one so many `times` as coarse take, and those of one twice as coarse
-/// again: some of a table grows with the square of the steps, as it covers a half-plane, and some, along curves in it,
-/// with their number.
-pub(super) fn grown(times: u64, [fine, coarse]: [u64; 2]) -> u64 {
-    // fine = linear + square, coarse = linear / 2 + square / 4
-    let square = (2 * fine).saturating_sub(4 * coarse).min(fine);
-    let linear = fine - square;
-    let grown = (linear.saturating_mul(times)).saturating_add(square.saturating_mul(times * times));
-    // Of small tables the system tells roughly.
-    grown.saturating_add(grown / 4)
+    let coarse = GridSpec::new(dims, grid.origin(), spacing);
+    coarse.map_or((*grid, 1), |coarse| (coarse, (times * times) as u64))
 }
 
 /// Says that the run takes more than there is, and ends the process.
@@ -296,18 +284,6 @@ mod tests {
             assert!(within(room, process, &need, 8).is_ok_and(|n| (4..=8).contains(&n)));
             assert_eq!(within(u64::MAX, process, &need, 8), Ok(8));
         }
-    }
-
-    #[test]
-    fn tables_grow_between_linearly_and_with_the_square() {
-        let grown = |times, told| grown(times, told) * 4 / 5;
-        assert_eq!(grown(1, [1000, 300]), 1000);
-        assert_eq!(grown(4, [1000, 500]), 4000);
-        assert_eq!(grown(4, [1000, 250]), 16_000);
-        assert_eq!(grown(4, [1000, 400]), 2400 + 6400);
-        // Beyond either: what is told is rounded.
-        assert_eq!(grown(4, [1000, 100]), 16_000);
-        assert_eq!(grown(4, [1000, 900]), 4000);
     }
 
     #[test]

@@ -91,7 +91,7 @@ pub(super) fn run(
         .with_cancel(&interrupted);
     interrupt::check()?;
     // The tables are there: what is missing is known.
-    plan.budget.expect(0);
+    plan.budget.expect_none();
     plan.layer_bytes = (plan.layer_bytes).saturating_add(sampler.bytes_per_thread());
     plan.workers = plan.room()?;
     if let Some(warning) = scene.grid_warning(&plan.grid) {
@@ -339,17 +339,9 @@ fn plan(
         formats,
     };
     if (plan.budget).is_tight(plan.fixed_bytes.saturating_add(plan.layer_bytes)) {
-        let times = memory::coarser(&grid);
-        let taken = |times: usize| {
-            let coarse = memory::coarse(&grid, times);
-            let make = || LayerSampler::with_kernel(kernel, scene.assembly(), &coarse, selection);
-            plan.budget.taken_by((TABLES, LESS), console, make)
-        };
-        let fine = taken(times);
-        // Those of the grid itself tell all.
-        let coarse = if times > 1 { taken(2 * times) } else { fine };
-        let tables = memory::grown(times as u64, [fine, coarse]);
-        plan.budget.expect(tables);
+        let (coarse, times) = memory::coarser(&grid);
+        let make = || LayerSampler::with_kernel(kernel, scene.assembly(), &coarse, selection);
+        plan.budget.expect((TABLES, LESS), console, times, make);
     }
     // What is too large without its tables is not worth making them.
     plan.room()?;
