@@ -629,9 +629,9 @@ mod tests {
             let (body, bounds) = (turned(&of), of.bounds());
             let sides = bounds.sides() / 13.0;
             let mut state = 1_u64;
-            let mut compared = 0;
+            let (mut compared, mut held) = (0, 0);
             let (mut worst, mut chords) = (0.0_f64, 0.0_f64);
-            while compared < 4 {
+            while held < 6 && compared < 16 {
                 state = state
                     .wrapping_mul(6_364_136_223_846_793_005)
                     .wrapping_add(1);
@@ -656,15 +656,17 @@ mod tests {
                     let a = cut_cell(body, complement, centre, sides, TOLERANCE);
                     let b = rows.cut_cell(TOLERANCE);
                     worst = worst.max(a.error);
+                    if b.error > 1e-9 {
+                        // Rows ran out.
+                        continue;
+                    }
+                    held += 1;
                     chords = chords.max(b.error);
                     // Where a surface touches a side, rows see it to the root of rounding.
                     let touching = a.sides.iter().zip(&b.sides);
                     let touching = touching.flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]);
                     let touching = touching.fold(0.0, |m: f64, off| m.max(off.abs()));
-                    assert!(
-                        touching <= 1e-5 + b.error,
-                        "{text}: sides of {centre}: {a:?}\n{b:?}"
-                    );
+                    assert!(touching <= 1e-5, "{text}: sides of {centre}: {a:?}\n{b:?}");
                     let within = a.error + b.error + 1e-11 + touching;
                     let face = [sides.y * sides.z, sides.z * sides.x, sides.x * sides.y];
                     let largest = face[0].max(face[1]).max(face[2]);
@@ -685,8 +687,8 @@ mod tests {
                     }
                 }
             }
-            eprintln!("{worst:.1e} circles, {chords:.1e} chords: {text}");
-            assert!(worst <= 1e-9, "{text}");
+            eprintln!("{worst:.1e} circles, {chords:.1e} chords, {held} cells: {text}");
+            assert!(worst <= 1e-9 && held > 0, "{text}");
         }
     }
 

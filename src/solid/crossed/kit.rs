@@ -135,7 +135,7 @@ impl Crossed<'_> {
         }
         let closure = (0..3).map(|c| {
             let [low, high] = cell.sides[c];
-            (cell.normal[c] + faces[c] * (high - low)).abs() / largest
+            (cell.normal[c] + faces[c] * (high - low)).abs() / faces[c]
         });
         cell.error = closure.fold(cell.error, f64::max) + 2.0 * self.rounding;
         cell
