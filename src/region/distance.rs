@@ -112,6 +112,12 @@ impl DistanceSet {
     /// The distance from (r, z) to the nearest piece and the point of it that is nearest; `None`
     /// where there is no piece. Of several such points, that of the first piece found.
     pub(crate) fn nearest(&self, point: [f64; 2]) -> Option<(f64, [f64; 2])> {
+        let (arc, distance) = self.nearest_arc(point)?;
+        Some((distance, arc.foot(point)))
+    }
+
+    /// The piece with that point, and the distance.
+    fn nearest_arc(&self, point: [f64; 2]) -> Option<(&Arc, f64)> {
         let mut best = f64::INFINITY;
         let mut found = None;
         self.tree.visit_nearest(point, best, |i, limit| {
@@ -122,7 +128,7 @@ impl DistanceSet {
             }
             best
         });
-        found.map(|i| (best.sqrt(), self.arcs[i].foot(point)))
+        found.map(|i: usize| (&self.arcs[i], best.sqrt()))
     }
 }
 
@@ -140,17 +146,8 @@ pub(crate) struct Touch {
 impl DistanceSet {
     /// As [`nearest`](Self::nearest), with the curve's tangent and curvature.
     pub(crate) fn touch(&self, point: [f64; 2]) -> Option<Touch> {
-        let mut best = f64::INFINITY;
-        let mut found = None;
-        self.tree.visit_nearest(point, best, |i, limit| {
-            let square = self.arcs[i as usize].distance_squared(point, limit);
-            if square < best {
-                best = square;
-                found = Some(i as usize);
-            }
-            best
-        });
-        found.map(|i| self.arcs[i].touch(point, best.sqrt()))
+        let (arc, distance) = self.nearest_arc(point)?;
+        Some(arc.touch(point, distance))
     }
 }
 

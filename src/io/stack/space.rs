@@ -102,9 +102,11 @@ impl StackSpace {
         } else {
             1
         };
+        // Volumes, ranges and what is said of a total that is not measured may be longer than was thought likely.
+        let digits = 192 + 32 * of.channels.len() as u64;
         Ok(Self {
             files: bytes,
-            beside: manifest.saturating_mul(times as u64),
+            beside: manifest.saturating_mul(times as u64).saturating_add(digits),
         })
     }
 
