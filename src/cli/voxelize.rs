@@ -124,12 +124,14 @@ pub(super) fn run(
     plan.expected_bytes = expected;
     let Ways {
         flux,
+        sheets,
         sections,
         crossed,
         divided,
     } = tally.ways;
     tracing::debug!(
         flux,
+        sheets,
         sections,
         crossed,
         divided,

@@ -63,6 +63,10 @@ pub(crate) struct FaceTouch {
 /// A nearly flat part of an outer face: control points (w x, w y, w z, w) times `unit`, from `origin`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FacePart<'a> {
+    /// Its face's place in [`FaceSet::faces`], where it begins in that face's parameters, and its sides there.
+    pub(crate) face: u32,
+    pub(crate) low: [f64; 2],
+    pub(crate) sides: [f64; 2],
     pub(crate) degrees: [usize; 2],
     /// The first index fastest.
     pub(crate) points: &'a [[f64; 4]],
@@ -263,6 +267,9 @@ impl FaceSet {
             let part = &self.tree.parts[i];
             let outward = self.faces.get(part.face as usize).map_or(0, |f| f.outward);
             each(&FacePart {
+                face: part.face,
+                low: part.low,
+                sides: part.sides,
                 degrees: part.net.degrees,
                 points: &part.net.points,
                 origin: centre + DVec3::from_array(part.origin) * unit,

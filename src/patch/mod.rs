@@ -72,5 +72,6 @@ mod turned;
 
 pub use cells::Cells;
 pub use face::{End, OuterFace, outer_faces};
+pub(crate) use face_set::FacePart;
 pub use face_set::{FaceSet, NearestFace};
 pub use invert::Preimage;

@@ -11,7 +11,7 @@ use super::layer::Cancel;
 use super::tally::Tally;
 use crate::grid::GridSpec;
 use crate::math::{Kernel, Side};
-use crate::solid::{Assembly, Crossed, Factor, STRETCHES, TOLERANCE, Term, VoxelShape};
+use crate::solid::{Assembly, Crossed, Factor, RowSheets, STRETCHES, TOLERANCE, Term, VoxelShape};
 use glam::DVec3;
 
 /// A larger error of the flux gains nothing, and would be seen in the sum.
@@ -134,6 +134,10 @@ impl FractionSampler {
         let mut shares = vec![Share::Nothing; bodies.len()];
         let mut sum = 0.0;
         let first = j * out.len();
+        let sheets = bodies.iter().zip(&self.shapes);
+        let sheets: Vec<Option<RowSheets>> = sheets
+            .map(|(body, shape)| body.row_sheets(shape, grid.centre(0, j, k), out.len()))
+            .collect();
         let known = |b: usize, i: usize| Some(scratch.shares.get(b)?.as_ref()?[first + i]);
         for (i, value) in out.iter_mut().enumerate() {
             let centre = grid.centre(i, j, k);
@@ -148,6 +152,12 @@ impl FractionSampler {
                 }
                 let inside = sides[b][i] != Side::Outside;
                 shares[b] = Share::of(inside);
+                if let Some(sheets) = &sheets[b] {
+                    if sheets.may_touch(i) {
+                        shares[b] = Share::Some;
+                    }
+                    continue;
+                }
                 if clear[b] > 0 {
                     clear[b] -= 1;
                     continue;
@@ -179,8 +189,23 @@ impl FractionSampler {
                         } else {
                             let shape = &self.shapes[one.body];
                             let body = &bodies[one.body];
-                            let share = body.fraction_within(shape, centre, &[], self.tolerance);
-                            tally.ways.sections += 1;
+                            let inside = sides[one.body][i] != Side::Outside;
+                            let sheets = sheets[one.body].as_ref();
+                            let goal = self.error.min(FOR_SUMS);
+                            let share = match sheets.and_then(|s| s.share(i, inside, goal)) {
+                                Some((share, true)) => {
+                                    tally.ways.sheets += 1;
+                                    share
+                                }
+                                Some((share, false)) => {
+                                    tally.ways.sections += 1;
+                                    share
+                                }
+                                None => {
+                                    tally.ways.sections += 1;
+                                    body.fraction_within(shape, centre, &[], self.tolerance)
+                                }
+                            };
                             tally.loose.count(1, share.error, self.error);
                             share.value
                         };

@@ -24,7 +24,9 @@ pub struct Tally {
 pub struct Ways {
     /// By the flux through their sides.
     pub flux: u64,
-    /// By the sections of one body in them.
+    /// By the height of one smooth sheet over a side.
+    pub sheets: u64,
+    /// By the sections of one body in them, or its surface's integral.
     pub sections: u64,
     /// By the chords of rows, as several bodies cross them.
     pub crossed: u64,
@@ -86,6 +88,7 @@ impl Tally {
         self.unseen += other.unseen;
         self.uncut += other.uncut;
         self.ways.flux += other.ways.flux;
+        self.ways.sheets += other.ways.sheets;
         self.ways.sections += other.ways.sections;
         self.ways.crossed += other.ways.crossed;
         self.ways.divided += other.ways.divided;

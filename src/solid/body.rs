@@ -13,6 +13,7 @@ use super::block::Block;
 use super::ellipsoid::Ellipsoid;
 use super::fraction::CellShape;
 use super::measure::{Measures, Moments};
+use super::patch_fraction::RowSheets;
 use super::patches::Patches;
 use super::path::Stretch;
 use super::revolved::Revolved;
@@ -193,6 +194,19 @@ impl Body {
         Integral {
             value,
             error: STRETCHES * tolerance,
+        }
+    }
+
+    /// The sheets of the surface that pass a row of voxels along x, its first centre `first`, where shares are told by them.
+    pub(crate) fn row_sheets(
+        &self,
+        voxel: &VoxelShape,
+        first: DVec3,
+        count: usize,
+    ) -> Option<RowSheets> {
+        match self {
+            Self::Patches(b) => Some(b.row_sheets(voxel.sides, first, count)),
+            _ => None,
         }
     }
 

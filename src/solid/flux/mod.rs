@@ -135,6 +135,15 @@ pub(super) fn share(nets: &[Net], spaces: &[HalfSpace], goal: f64) -> Integral {
     best.unwrap_or_default()
 }
 
+/// The share of the cube, with L along one of its axes.
+///
+/// * `nets`: all of the surface that has points before or behind the cube along the axis.
+pub(super) fn share_along(axis: usize, nets: &[Net], goal: f64) -> Integral {
+    let best = directions(nets, &[]).into_iter().find(|d| d.axis == axis);
+    best.map(|direction| direction.share(nets, &[], goal, true))
+        .unwrap_or_default()
+}
+
 /// An axis of the cube that L is measured along.
 #[derive(Debug, Clone, Copy)]
 struct Direction {

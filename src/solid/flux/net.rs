@@ -21,8 +21,34 @@ pub(in super::super) struct Net {
 }
 
 impl Net {
+    /// The box of its control points.
+    pub(in super::super) fn bounds(&self) -> [[f64; 2]; 3] {
+        let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+        for h in &self.points {
+            for k in 0..3 {
+                let c = h[k] / h[3];
+                bounds[k] = [bounds[k][0].min(c), bounds[k][1].max(c)];
+            }
+        }
+        bounds
+    }
+
+    /// The parameter along which the corners are further apart.
+    pub(in super::super) fn longer(&self) -> usize {
+        let [n, m] = self.degrees;
+        let at = |i: usize, j: usize| self.points[i + (n + 1) * j];
+        let far = |a: Point, b: Point| {
+            (0..3)
+                .map(|k| (a[k] / a[3] - b[k] / b[3]).abs())
+                .fold(0.0, f64::max)
+        };
+        let along = far(at(0, 0), at(n, 0)).max(far(at(0, m), at(n, m)));
+        let across = far(at(0, 0), at(0, m)).max(far(at(n, 0), at(n, m)));
+        usize::from(across > along)
+    }
+
     /// Both sides of `t` along a parameter.
-    pub(super) fn split(&self, direction: usize, t: f64) -> [Self; 2] {
+    pub(in super::super) fn split(&self, direction: usize, t: f64) -> [Self; 2] {
         let [n, m] = self.degrees.map(|d| d + 1);
         let (count, rows, step, stride) = if direction == 0 {
             (n, m, 1, n)

@@ -47,6 +47,12 @@ impl Place {
         apart.cmpgt(DVec3::splat(0.5 + 1e-9)).bitmask().count_ones() < 2
     }
 
+    /// Whether a box, its middle seen from the voxel's centre, may have points in the voxel.
+    pub(in super::super) fn may_touch(&self, middle: DVec3, half: DVec3) -> bool {
+        let apart = (self.to_cell * middle).abs() - self.reach(half) * (1.0 + 1e-9);
+        apart.cmple(DVec3::splat(0.5 + 1e-9)).all()
+    }
+
     /// A half-space from the voxel's centre, in the solid's coordinates.
     pub(in super::super) fn space(&self, normal: DVec3, offset: f64) -> HalfSpace {
         HalfSpace {
