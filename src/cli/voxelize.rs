@@ -128,6 +128,7 @@ pub(super) fn run(
         sections,
         crossed,
         divided,
+        cells,
     } = tally.ways;
     tracing::debug!(
         flux,
@@ -135,6 +136,7 @@ pub(super) fn run(
         sections,
         crossed,
         divided,
+        ?cells,
         "voxels whose fractions were integrated"
     );
     within_error(&tally, plan.selection.fraction_error)?;

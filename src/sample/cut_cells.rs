@@ -33,7 +33,7 @@ impl LayerSampler<'_> {
                 let cell = if is_cut {
                     let centre = self.grid.centre(i, j, k);
                     let terms = self.terms_near(centre, reach);
-                    match self.cell(&terms, centre, sides, error) {
+                    match self.cell(&terms, (centre, sides), error, &mut out.tally.ways.cells) {
                         Some(cell) => cell,
                         None => {
                             out.tally.uncut += 1;
@@ -94,9 +94,9 @@ impl LayerSampler<'_> {
     fn cell(
         &self,
         terms: &Option<Vec<Term>>,
-        centre: DVec3,
-        sides: DVec3,
+        (centre, sides): (DVec3, DVec3),
         error: f64,
+        ways: &mut [u64; 3],
     ) -> Option<CutCell> {
         let open = match terms.as_deref() {
             None => return Some(SOLID),
@@ -105,14 +105,21 @@ impl LayerSampler<'_> {
         };
         let bodies = self.assembly.bodies();
         let tolerance = ESTIMATED * error;
-        // What one turned body cuts has a way of its own.
+        // What one turned body cuts has ways of its own.
         if let [Term { factors }] = open
             && let [one] = factors.as_slice()
             && let Some(body) = bodies[one.body].turned_region()
         {
+            let sheet = bodies[one.body].sheet_cell(one.complement, centre, sides, tolerance);
+            if sheet.is_some() {
+                ways[0] += 1;
+                return sheet;
+            }
+            ways[1] += 1;
             return Some(cut_cell(body, one.complement, centre, sides, tolerance));
         }
         let rows = Crossed::new(bodies, open, centre, sides)?;
+        ways[2] += 1;
         Some(rows.cut_cell(tolerance))
     }
 }

@@ -32,6 +32,8 @@ pub struct Ways {
     pub crossed: u64,
     /// By division, as several bodies touch them of which one has no chords.
     pub divided: u64,
+    /// Cut cells by the height of one smooth sheet, by the circles of a turned body, by the chords of rows.
+    pub cells: [u64; 3],
 }
 
 /// Error allowed to a fraction, in voxels, where no other is asked for.
@@ -92,6 +94,9 @@ impl Tally {
         self.ways.sections += other.ways.sections;
         self.ways.crossed += other.ways.crossed;
         self.ways.divided += other.ways.divided;
+        for (all, one) in self.ways.cells.iter_mut().zip(other.ways.cells) {
+            *all += one;
+        }
         for (&material, &voxels) in &other.materials {
             *self.materials.entry(material).or_default() += voxels;
         }

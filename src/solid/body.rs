@@ -10,8 +10,10 @@
 //! What a family must answer is what [`Body`] does; the rest of the crate asks the body.
 
 use super::block::Block;
+use super::crossed::CutCell;
 use super::ellipsoid::Ellipsoid;
 use super::fraction::CellShape;
+use super::height;
 use super::measure::{Measures, Moments};
 use super::patch_fraction::RowSheets;
 use super::patches::Patches;
@@ -208,6 +210,41 @@ impl Body {
             Self::Patches(b) => Some(b.row_sheets(voxel.sides, first, count)),
             _ => None,
         }
+    }
+
+    /// The share of the voxel centred on `centre` that lies in the solid, where one smooth sheet of a turned body passes
+    /// it and the proved bound of the error is at most `goal`.
+    pub(crate) fn sheet_share(
+        &self,
+        voxel: &VoxelShape,
+        centre: DVec3,
+        goal: f64,
+    ) -> Option<Integral> {
+        let (net, region) = height::swept(self.turned_region()?, voxel.sides, centre)?;
+        let found = height::share_of_patch(&net, net.across(), &region, goal)?;
+        let Integral { value, error } = found.share;
+        let value = if found.is_solid? { value } else { 1.0 - value };
+        Some(Integral {
+            value: value.clamp(0.0, 1.0),
+            error,
+        })
+    }
+
+    /// All that is asked of a cell that one smooth sheet of a turned body passes, or of what the body leaves of it, to an
+    /// estimated error of `goal`.
+    pub(crate) fn sheet_cell(
+        &self,
+        is_complement: bool,
+        centre: DVec3,
+        sides: DVec3,
+        goal: f64,
+    ) -> Option<CutCell> {
+        let (mut net, region) = height::swept(self.turned_region()?, sides, centre)?;
+        if is_complement {
+            net.sign = -net.sign;
+        }
+        let faces = [sides.y * sides.z, sides.z * sides.x, sides.x * sides.y];
+        height::cell_of_patch(&net, net.across(), &region, faces, goal)
     }
 
     /// Volume, area and moments, with estimates of their errors.

@@ -105,7 +105,7 @@ impl RowSheets {
                 whole.map(|at| to_part(k, at))
             }),
         };
-        height::share_of_patch(&seen_from(&one.net, i), across(&one.net), &region, goal)
+        height::share_of_patch(&seen_from(&one.net, i), one.net.across(), &region, goal)
     }
 
     /// Cuts a part until it is small or beside the row, of `count` voxels.
@@ -247,16 +247,4 @@ fn net_of(place: &Place, part: &FacePart<'_>) -> Net {
     let points = points.map(|h| [h[0] * part.unit, h[1] * part.unit, h[2] * part.unit, h[3]]);
     let outward = f64::from(part.outward);
     place.net(part.degrees, points, part.origin, outward, part.slack)
-}
-
-/// The axis that a nearly flat part is most across.
-fn across(net: &Net) -> usize {
-    let [n, m] = net.degrees;
-    let corner = |i: usize, j: usize| {
-        let h = net.points[i + (n + 1) * j];
-        DVec3::new(h[0], h[1], h[2]) / h[3]
-    };
-    let normal = (corner(n, m) - corner(0, 0)).cross(corner(0, m) - corner(n, 0));
-    let normal = normal.abs();
-    (0..3).fold(0, |a, k| if normal[k] > normal[a] { k } else { a })
 }

@@ -1,5 +1,6 @@
 //! A rational Bézier patch in a cell's coordinates, while it is cut.
 
+use glam::DVec3;
 use smallvec::SmallVec;
 
 /// A homogeneous point (w x, w y, w z, w).
@@ -31,6 +32,18 @@ impl Net {
             }
         }
         bounds
+    }
+
+    /// The axis that a nearly flat part is most across.
+    pub(in super::super) fn across(&self) -> usize {
+        let [n, m] = self.degrees;
+        let corner = |i: usize, j: usize| {
+            let h = self.points[i + (n + 1) * j];
+            DVec3::new(h[0], h[1], h[2]) / h[3]
+        };
+        let normal = (corner(n, m) - corner(0, 0)).cross(corner(0, m) - corner(n, 0));
+        let normal = normal.abs();
+        (0..3).fold(0, |a, k| if normal[k] > normal[a] { k } else { a })
     }
 
     /// The parameter along which the corners are further apart.

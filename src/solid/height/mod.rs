@@ -14,9 +14,14 @@
 //! ellipses of [`proof`](super::flux); the integrand of the linear parts is a polynomial that it has exactly, so M is the bound of the
 //! rest.
 
+mod kit;
 mod patch;
+mod swept;
+#[cfg(test)]
+mod tests;
 
-pub(super) use patch::{Below, Region, share_of_patch};
+pub(super) use patch::{Below, Region, cell_of_patch, share_of_patch};
+pub(super) use swept::swept;
 
 use crate::math::quadrature::Integral;
 use smallvec::SmallVec;
@@ -42,6 +47,16 @@ static RULES: LazyLock<[Vec<(f64, f64)>; POINTS.len()]> = LazyLock::new(|| {
     })
 });
 
+/// ρ^-2n / (1 - ρ^-2) for each ellipse and rule.
+static TAILS: LazyLock<[[f64; POINTS.len()]; RHO.len()]> = LazyLock::new(|| {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        reason = "a few points"
+    )]
+    RHO.map(|rho| POINTS.map(|n| rho.powi(-2 * (n as i32)) / (1.0 - 1.0 / (rho * rho))))
+});
+
 /// A sheet of surface over the square |y|, |z| <= ½.
 pub(super) trait Height {
     /// a, b and c of the linear part.
@@ -52,6 +67,9 @@ pub(super) trait Height {
 
     /// The height at a place of the square.
     fn at(&self, y: f64, z: f64) -> Option<f64>;
+
+    /// The height and its slopes.
+    fn slopes(&self, y: f64, z: f64) -> Option<[f64; 3]>;
 }
 
 /// Where rows along y begin or end.
@@ -63,11 +81,32 @@ enum End {
     Level(f64),
 }
 
-/// A part of the square between two z, with the rows along y on which the height is within the cell.
+/// A part of the square between two z.
+#[derive(Debug, Clone, Copy)]
 struct Panel {
     z: [f64; 2],
-    ends: [End; 2],
+    rows: Rows,
 }
+
+/// The rows of a panel along y.
+#[derive(Debug, Clone, Copy)]
+enum Rows {
+    /// All above the sheet.
+    Empty,
+    /// All below it.
+    Full,
+    /// Between these ends the height is within the cell; up to the first they are above the sheet, from the second on below it.
+    Cut([End; 2]),
+}
+
+impl Panel {
+    /// The middle and half the width.
+    fn span(&self) -> [f64; 2] {
+        [0.5 * (self.z[0] + self.z[1]), 0.5 * (self.z[1] - self.z[0])]
+    }
+}
+
+type Panels = SmallVec<[Panel; 5]>;
 
 /// A sheet that rises along y no less than it changes along z.
 struct Sheet<'a, H> {
@@ -121,8 +160,10 @@ pub(super) fn share(height: &impl Height, goal: f64) -> Option<Integral> {
     if !levels.is_empty() && sheet.b <= 1.05 * sheet.steep {
         return None;
     }
-    let mut panels = SmallVec::new();
-    sheet.panels(&levels, goal, &mut sum, &mut panels)?;
+    let mut panels = Panels::new();
+    // A level that comes no further within a side of the square is taken for beyond it: it counts squared.
+    let near = (0.02 * goal * sheet.b).sqrt();
+    sum.error += sheet.panels(&levels, near, &mut panels)? * 0.02 * goal;
     #[allow(clippy::cast_precision_loss, reason = "a few")]
     let each = 0.5 * goal / panels.len().max(1) as f64;
     for panel in &panels {
@@ -167,17 +208,11 @@ impl<'a, H: Height> Sheet<'a, H> {
         self.a + self.b * y + self.c * z
     }
 
-    /// Cuts the square where rows begin or cease to pass a level; what is wholly below the sheet is added at once.
-    fn panels(
-        &self,
-        levels: &[f64],
-        goal: f64,
-        sum: &mut Integral,
-        out: &mut SmallVec<[Panel; 5]>,
-    ) -> Option<()> {
+    /// Cuts the square where rows begin or cease to pass a level, and tells how often one that comes no further within a side than
+    /// `near` was taken for beyond it.
+    fn panels(&self, levels: &[f64], near: f64, out: &mut Panels) -> Option<f64> {
         let mut cuts: SmallVec<[f64; 6]> = SmallVec::from_slice(&[-0.5, 0.5]);
-        // A level that comes no further within a side of the square is taken for beyond it.
-        let near = (0.02 * goal * self.b).sqrt();
+        let mut passed = 0.0;
         for &level in levels {
             for side in [-0.5, 0.5] {
                 let middle = self.linear(side, 0.0) - level;
@@ -186,7 +221,7 @@ impl<'a, H: Height> Sheet<'a, H> {
                     continue;
                 }
                 if middle.abs() + reach <= near {
-                    sum.error += 0.02 * goal;
+                    passed += 1.0;
                     continue;
                 }
                 // Rising or falling throughout.
@@ -197,40 +232,32 @@ impl<'a, H: Height> Sheet<'a, H> {
             }
         }
         cuts.sort_by(f64::total_cmp);
+        cuts.dedup_by(|b, a| *b - *a <= 1e-14);
         for pair in cuts.windows(2) {
-            let width = pair[1] - pair[0];
-            if width <= 1e-13 {
-                sum.error += width;
-                continue;
-            }
             let middle = 0.5 * (pair[0] + pair[1]);
             let lower = self.at(-0.5, middle)?;
             let upper = self.at(0.5, middle)?;
-            let mut ends = [End::Side(-0.5), End::Side(0.5)];
+            let mut rows = Rows::Cut([End::Side(-0.5), End::Side(0.5)]);
             for &level in levels {
-                let below = level < 0.0;
+                let is_lower = level < 0.0;
                 if upper <= level {
-                    if below {
-                        // All of the rows are above the sheet.
-                        ends = [End::Side(0.5); 2];
+                    if is_lower {
+                        rows = Rows::Empty;
                     }
                 } else if lower >= level {
-                    if !below {
-                        ends = [End::Side(-0.5); 2];
+                    if !is_lower {
+                        rows = Rows::Full;
                     }
-                } else {
-                    ends[usize::from(!below)] = End::Level(level);
+                } else if let Rows::Cut(ends) = &mut rows {
+                    ends[usize::from(!is_lower)] = End::Level(level);
                 }
             }
-            match ends {
-                [End::Side(from), End::Side(to)] if from == to => sum.value += width * (0.5 - to),
-                _ => out.push(Panel {
-                    z: [pair[0], pair[1]],
-                    ends,
-                }),
-            }
+            out.push(Panel {
+                z: [pair[0], pair[1]],
+                rows,
+            });
         }
-        Some(())
+        Some(passed)
     }
 
     /// Where the sheet over a side, on which it rises or falls, has a height; `None` inside where it has nowhere.
@@ -264,19 +291,24 @@ impl<'a, H: Height> Sheet<'a, H> {
 
     /// Adds the part of a panel below the sheet, within `goal`.
     fn add(&self, panel: &Panel, goal: f64, sum: &mut Integral) -> Option<()> {
-        let (rule, error) = self.rule(panel, goal);
+        let [middle, half] = panel.span();
+        let ends = match panel.rows {
+            Rows::Empty => return Some(()),
+            Rows::Full => {
+                sum.value += 2.0 * half;
+                return Some(());
+            }
+            Rows::Cut(ends) => ends,
+        };
+        let (rule, error) = self.rule([middle, half], ends, goal);
         if !(error <= goal) {
             return None;
         }
         sum.error += error;
         let rule = &RULES[rule];
-        let (middle, half) = (
-            0.5 * (panel.z[0] + panel.z[1]),
-            0.5 * (panel.z[1] - panel.z[0]),
-        );
         for &(node, weight) in rule {
             let z = middle + half * node;
-            let [from, to] = panel.ends.map(|end| self.end(end, z));
+            let [from, to] = ends.map(|end| self.end(end, z, 3e-8));
             let ([from, low_error], [to, high_error]) = (from?, to?);
             let (m, h) = (0.5 * (from + to), 0.5 * (to - from));
             let mut row = 0.0;
@@ -290,7 +322,9 @@ impl<'a, H: Height> Sheet<'a, H> {
     }
 
     /// Where a row ends, and what the row's sum may be off by that.
-    fn end(&self, end: End, z: f64) -> Option<[f64; 2]> {
+    ///
+    /// * `within`: what the height may be off there.
+    fn end(&self, end: End, z: f64, within: f64) -> Option<[f64; 2]> {
         let level = match end {
             End::Side(y) => return Some([y, 0.0]),
             End::Level(level) => level,
@@ -303,7 +337,7 @@ impl<'a, H: Height> Sheet<'a, H> {
         let lost = |off: f64| off * off / least;
         for _ in 0..8 {
             let off = self.at(y, z)? - level;
-            if lost(off) <= 1e-15 {
+            if off.abs() <= within {
                 let y = y - off / slope;
                 return Some([y, lost(off)]);
             }
@@ -321,11 +355,7 @@ impl<'a, H: Height> Sheet<'a, H> {
     }
 
     /// The first rule whose error over a panel is at most `goal`, or the last, and that error.
-    fn rule(&self, panel: &Panel, goal: f64) -> (usize, f64) {
-        let (zc, hw) = (
-            0.5 * (panel.z[0] + panel.z[1]),
-            0.5 * (panel.z[1] - panel.z[0]),
-        );
+    fn rule(&self, [zc, hw]: [f64; 2], ends: [End; 2], goal: f64) -> (usize, f64) {
         let mut errors = [f64::INFINITY; POINTS.len()];
         // The ends' lines, in the panel's own z.
         let line = |end: End| match end {
@@ -335,8 +365,8 @@ impl<'a, H: Height> Sheet<'a, H> {
                 -self.c * hw / self.b,
             ],
         };
-        let [low, high] = panel.ends.map(line);
-        let [low_bent, high_bent] = panel.ends.map(|end| matches!(end, End::Level(_)));
+        let [low, high] = ends.map(line);
+        let [low_bent, high_bent] = ends.map(|end| matches!(end, End::Level(_)));
         let middle = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
         let half = [0, 1].map(|k| 0.5 * (high[k] - low[k]));
         for (size, off) in SIZES.into_iter().zip(self.deviations) {
@@ -346,7 +376,7 @@ impl<'a, H: Height> Sheet<'a, H> {
             let bend = |bent: bool| if bent { off / self.b } else { 0.0 };
             let (low_off, high_off) = (bend(low_bent), bend(high_bent));
             let off_line = 0.5 * (low_off + high_off);
-            for rho in RHO {
+            for (rho, tails) in RHO.into_iter().zip(TAILS.iter()) {
                 let sigma = 0.5 * (rho + 1.0 / rho);
                 let reach = |line: [f64; 2]| line[0].abs() + line[1].abs() * sigma;
                 let half_most = reach(half) + off_line;
@@ -364,16 +394,10 @@ impl<'a, H: Height> Sheet<'a, H> {
                     + self.b * reach(half) * sigma;
                 let rows = hw * (off_line * (straight + rest) + reach(half) * rest);
                 let beyond = hw * high_off;
-                for (error, n) in errors.iter_mut().zip(POINTS) {
-                    #[allow(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_possible_wrap,
-                        reason = "a few points"
-                    )]
-                    let tail = rho.powi(-2 * (n as i32)) / (1.0 - 1.0 / (rho * rho));
-                    // Over [-1, 1] in both directions, and in one.
-                    let bound = tail * 64.0 / 15.0 * (4.0 * rows + beyond);
-                    *error = error.min(bound);
+                // Over [-1, 1] in both directions, and in one.
+                let most = 64.0 / 15.0 * (4.0 * rows + beyond);
+                for (error, tail) in errors.iter_mut().zip(tails) {
+                    *error = error.min(most * tail);
                 }
             }
         }

@@ -15,7 +15,9 @@
 //! The real patch is one to one where the slopes of D, measured in the set's sizes, sum to less than 1: then it is the
 //! graph over the square and nothing else of it is in the cell.
 
+use super::super::crossed::CutCell;
 use super::super::flux::Net;
+use super::kit::{Faces, kit};
 use super::{Height, SIZES};
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::{HalfSpace, box_share_under};
@@ -71,7 +73,7 @@ pub(in super::super) struct Below {
 /// Quarterings of a square.
 const QUARTERINGS: u32 = 8;
 /// Squares that are looked at.
-const SQUARES: u32 = 300;
+const SQUARES: u32 = 100;
 
 /// The share of the cube |x|, |y|, |z| <= ½ below a part of a face, of which nothing else and no other surface is in the cube;
 /// `None` where it is not proved to be a sheet over the square across `axis`, or to `goal`.
@@ -85,13 +87,7 @@ pub(in super::super) fn share_of_patch(
     region: &Region,
     goal: f64,
 ) -> Option<Below> {
-    let axes = [axis, (axis + 1) % 3, (axis + 2) % 3];
-    let points = net.points.iter();
-    let points = points.map(|h| [h[axes[0]], h[axes[1]], h[axes[2]], h[3]]);
-    let turned = Net {
-        points: points.collect(),
-        ..net.clone()
-    };
+    let (_, turned) = across(net, axis);
     let mut squares = Squares {
         region,
         goal,
@@ -106,6 +102,39 @@ pub(in super::super) fn share_of_patch(
     (error <= goal).then_some(squares.below)
 }
 
+/// All that is asked of a cell that only a part of a face passes, to an estimated error of `goal`; `None` where it is not proved to
+/// be a sheet over the square across `axis` that is over the face in all of it, or `goal` is not reached.
+///
+/// * `faces`: the areas of the cell's sides across its axes.
+pub(in super::super) fn cell_of_patch(
+    net: &Net,
+    axis: usize,
+    region: &Region,
+    faces: Faces,
+    goal: f64,
+) -> Option<CutCell> {
+    let (axes, turned) = across(net, axis);
+    let patch = Patch::new(&turned, region)?;
+    if !patch.is_over_face {
+        return None;
+    }
+    let mut kit = kit(&patch, axes.map(|k| faces[k]), patch.is_below, goal)?;
+    kit.error += patch.rounding();
+    Some(kit.cell(patch.is_below, axes))
+}
+
+/// The axes that become x, y and z, and the net in them.
+fn across(net: &Net, axis: usize) -> ([usize; 3], Net) {
+    let axes = [axis, (axis + 1) % 3, (axis + 2) % 3];
+    let points = net.points.iter();
+    let points = points.map(|h| [h[axes[0]], h[axes[1]], h[axes[2]], h[3]]);
+    let net = Net {
+        points: points.collect(),
+        ..net.clone()
+    };
+    (axes, net)
+}
+
 /// A sum over squares.
 struct Squares<'a> {
     region: &'a Region,
@@ -118,9 +147,9 @@ impl Squares<'_> {
     fn add(&mut self, net: &Net, quarterings: u32) -> Option<()> {
         self.left = self.left.checked_sub(1)?;
         let area = power(0.25, quarterings as usize);
-        if let Some(patch) = Patch::new(net, self.region)
-            && let Some(share) = self.share(&patch, area)
-        {
+        // A smaller square of what bends too much is for those who halve patches.
+        let patch = Patch::new(net, self.region)?;
+        if let Some(share) = self.share(&patch, area) {
             self.below.share.value += area * share.value;
             self.below.share.error += area * share.error;
             return Some(());
@@ -391,48 +420,101 @@ impl Height for Patch {
     fn at(&self, y: f64, z: f64) -> Option<f64> {
         let goal = self.to_parameters([y - self.origin[0], z - self.origin[1]]);
         let [mut s, mut t] = goal;
-        let count = self.degrees[0] + 1;
-        for round in 0..8 {
-            // Values and slopes, along s within each row and along t over the rows.
-            let (mut f, mut by_s, mut by_t) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            for row in self.taylor.chunks_exact(count).rev() {
-                let (mut value, mut slope) = ([0.0; 4], [0.0; 4]);
-                for h in row.iter().rev() {
-                    for c in 0..4 {
-                        slope[c] = slope[c] * s + value[c];
-                        value[c] = value[c] * s + h[c];
-                    }
-                }
-                for c in 0..4 {
-                    by_t[c] = by_t[c] * t + f[c];
-                    f[c] = f[c] * t + value[c];
-                    by_s[c] = by_s[c] * t + slope[c];
-                }
-            }
-            let off = [0, 1].map(|k| f[k] - goal[k] * f[3]);
-            let ds = [0, 1].map(|k| by_s[k] - goal[k] * by_s[3]);
-            let dt = [0, 1].map(|k| by_t[k] - goal[k] * by_t[3]);
-            let det = ds[0] * dt[1] - ds[1] * dt[0];
-            let step = [
-                (off[0] * dt[1] - off[1] * dt[0]) / det,
-                (off[1] * ds[0] - off[0] * ds[1]) / det,
-            ];
-            // Of e what the last step changes.
-            let rest = (f[2] - by_s[2] * step[0] - by_t[2] * step[1])
-                / (f[3] - by_s[3] * step[0] - by_t[3] * step[1]);
-            s -= step[0];
-            t -= step[1];
-            let moved = step[0].abs() + step[1].abs();
-            let size = goal[0].abs() + goal[1].abs();
-            // The step after a step of this size is rounding.
-            if moved <= 1e-8 * size || round == 7 {
-                let height =
-                    self.height[0] + self.height[1] * goal[0] + self.height[2] * goal[1] + rest;
-                return (height.is_finite() && moved <= 1e-7 * size.max(f64::MIN_POSITIVE))
-                    .then_some(height);
+        let size = goal[0].abs() + goal[1].abs();
+        for _ in 0..8 {
+            let step = self.step([s, t], goal);
+            s -= step.by[0];
+            t -= step.by[1];
+            let moved = step.by[0].abs() + step.by[1].abs();
+            // The step after one of this size is rounding.
+            if moved <= 1e-8 * size {
+                let height = self.height[0]
+                    + self.height[1] * goal[0]
+                    + self.height[2] * goal[1]
+                    + step.rest;
+                return height.is_finite().then_some(height);
             }
         }
         None
+    }
+
+    fn slopes(&self, y: f64, z: f64) -> Option<[f64; 3]> {
+        let goal = self.to_parameters([y - self.origin[0], z - self.origin[1]]);
+        let [mut s, mut t] = goal;
+        let size = goal[0].abs() + goal[1].abs();
+        for _ in 0..8 {
+            let step = self.step([s, t], goal);
+            let moved = step.by[0].abs() + step.by[1].abs();
+            if moved > 1e-13 * size.max(1e-3 * self.around_cell()) {
+                s -= step.by[0];
+                t -= step.by[1];
+                continue;
+            }
+            let [_, by_1, by_2] = self.height;
+            let slopes = [by_1 + step.slopes[0], by_2 + step.slopes[1]];
+            let height = self.height[0] + by_1 * goal[0] + by_2 * goal[1] + step.rest;
+            let by = |k: usize| slopes[0] * self.inverse[0][k] + slopes[1] * self.inverse[1][k];
+            let all = [height, by(0), by(1)];
+            return all.iter().all(|c| c.is_finite()).then_some(all);
+        }
+        None
+    }
+}
+
+/// A Newton step.
+struct Step {
+    by: [f64; 2],
+    /// e behind it, and its slopes by ξ before it.
+    rest: f64,
+    slopes: [f64; 2],
+}
+
+impl Patch {
+    /// What ξ changes by over the cell.
+    fn around_cell(&self) -> f64 {
+        self.inverse.iter().flatten().map(|c| c.abs()).sum()
+    }
+
+    /// From a place towards where ξ is `goal`.
+    fn step(&self, [s, t]: [f64; 2], goal: [f64; 2]) -> Step {
+        let count = self.degrees[0] + 1;
+        // Values and slopes, along s within each row and along t over the rows.
+        let (mut f, mut by_s, mut by_t) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+        for row in self.taylor.chunks_exact(count).rev() {
+            let (mut value, mut slope) = ([0.0; 4], [0.0; 4]);
+            for h in row.iter().rev() {
+                for c in 0..4 {
+                    slope[c] = slope[c] * s + value[c];
+                    value[c] = value[c] * s + h[c];
+                }
+            }
+            for c in 0..4 {
+                by_t[c] = by_t[c] * t + f[c];
+                f[c] = f[c] * t + value[c];
+                by_s[c] = by_s[c] * t + slope[c];
+            }
+        }
+        let off = [0, 1].map(|k| f[k] - goal[k] * f[3]);
+        let ds = [0, 1].map(|k| by_s[k] - goal[k] * by_s[3]);
+        let dt = [0, 1].map(|k| by_t[k] - goal[k] * by_t[3]);
+        let inverse = 1.0 / (ds[0] * dt[1] - ds[1] * dt[0]);
+        let by = [
+            (off[0] * dt[1] - off[1] * dt[0]) * inverse,
+            (off[1] * ds[0] - off[0] * ds[1]) * inverse,
+        ];
+        // Of e what the step changes.
+        let rest =
+            (f[2] - by_s[2] * by[0] - by_t[2] * by[1]) / (f[3] - by_s[3] * by[0] - by_t[3] * by[1]);
+        let e = f[2] / f[3];
+        let (e_s, e_t) = (by_s[2] - e * by_s[3], by_t[2] - e * by_t[3]);
+        Step {
+            by,
+            rest,
+            slopes: [
+                (e_s * dt[1] - e_t * ds[1]) * inverse,
+                (e_t * ds[0] - e_s * dt[0]) * inverse,
+            ],
+        }
     }
 }
 
