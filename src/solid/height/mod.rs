@@ -62,14 +62,22 @@ pub(super) trait Height {
     /// a, b and c of the linear part.
     fn linear(&self) -> [f64; 3];
 
-    /// E of the real square, and of each of [`SIZES`]: infinite where nothing is known.
-    fn deviations(&self) -> (f64, [f64; SIZES.len()]);
+    fn deviations(&self) -> Deviations;
 
     /// The height at a place of the square.
     fn at(&self, y: f64, z: f64) -> Option<f64>;
 
     /// The height and its slopes.
     fn slopes(&self, y: f64, z: f64) -> Option<[f64; 3]>;
+}
+
+/// Bounds of e: infinite where nothing is known.
+pub(super) struct Deviations {
+    /// Of |e| over the real square, and of its slopes there.
+    off: f64,
+    steep: f64,
+    /// E of each of [`SIZES`].
+    sizes: [f64; SIZES.len()],
 }
 
 /// Where rows along y begin or end.
@@ -176,11 +184,11 @@ pub(super) fn share(height: &impl Height, goal: f64) -> Option<Integral> {
 impl<'a, H: Height> Sheet<'a, H> {
     fn new(height: &'a H) -> Self {
         let [a, b, c] = height.linear();
-        let (off, deviations) = height.deviations();
+        let Deviations { off, steep, sizes } = height.deviations();
         let is_swapped = c.abs() > b.abs();
         let (b, c) = if is_swapped { (c, b) } else { (b, c) };
         // A disc of (R - 1)/2 about each place of the square (Cauchy's estimate).
-        let slopes = SIZES.iter().zip(&deviations);
+        let slopes = SIZES.iter().zip(&sizes);
         let slopes = slopes.map(|(size, off)| 2.0 * off / (size - 1.0));
         Self {
             height,
@@ -189,9 +197,9 @@ impl<'a, H: Height> Sheet<'a, H> {
             a,
             b: b.abs(),
             c,
-            steep: slopes.fold(f64::INFINITY, f64::min),
+            steep: slopes.fold(steep, f64::min),
             off,
-            deviations,
+            deviations: sizes,
         }
     }
 

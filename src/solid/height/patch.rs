@@ -18,7 +18,7 @@
 use super::super::crossed::CutCell;
 use super::super::flux::Net;
 use super::kit::{Faces, kit};
-use super::{Height, SIZES};
+use super::{Deviations, Height, SIZES};
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::{HalfSpace, box_share_under};
 use glam::DVec3;
@@ -45,8 +45,9 @@ struct Patch {
     origin: [f64; 2],
     /// What coordinates may be off, in cells.
     slack: f64,
-    /// E of the real square.
+    /// E of the real square, and a bound of the slopes of e there.
     off: f64,
+    steep: f64,
     /// Whether all of the square is over the face.
     is_over_face: bool,
     /// Whether the solid is below the sheet.
@@ -268,6 +269,7 @@ impl Patch {
             origin,
             slack: net.slack + 64.0 * f64::EPSILON * (1.0 + largest),
             off: f64::INFINITY,
+            steep: f64::INFINITY,
             is_over_face: false,
             is_below: (net.sign > 0.0) == (det > 0.0),
             taylor,
@@ -280,10 +282,17 @@ impl Patch {
         });
         let (off, radii) = patch.square(1.0)?;
         let wide = [0, 1].map(|k: usize| reach[k].max(radii[k]));
-        if !patch.is_injective(wide) {
+        if !(patch.moved(wide, patch.off(wide)?) < 0.999) {
             return None;
         }
         patch.off = off[2];
+        let by = patch.slopes_of(2, radii, off);
+        let moved = patch.moved(radii, off);
+        let largest = (0..2).flat_map(|k| patch.inverse[k].map(|c| c.abs() / radii[k]));
+        // The inverse of 1 + D' is at most 1 / (1 - moved).
+        if moved < 1.0 {
+            patch.steep = (by[0] + by[1]) / (1.0 - moved) * largest.fold(0.0, f64::max);
+        }
         let around = patch.around(1.0);
         let start = patch.to_parameters([-patch.origin[0], -patch.origin[1]]);
         patch.is_over_face = (0..2).all(|k| {
@@ -368,27 +377,31 @@ impl Patch {
         })
     }
 
-    /// Whether no two places with |s| <= r1 and |t| <= r2 have the same y and z.
-    fn is_injective(&self, radii: [f64; 2]) -> bool {
-        let Some(off) = self.off(radii) else {
-            return false;
-        };
+    /// A bound of a table's derivative along s (0) or t (1), times the radius.
+    fn slope(&self, table: &Table, along: usize, radii: [f64; 2]) -> f64 {
         let stride = self.degrees[0] + 2;
-        // A derivative along s (0) or t (1), times the radius.
-        let slope = |table: &Table, along: usize| {
-            let mut sum = 0.0;
-            for (n, c) in table.iter().enumerate() {
-                let at = [n % stride, n / stride];
-                sum += c * real(at[along]) * power(radii[0], at[0]) * power(radii[1], at[1]);
-            }
-            sum
-        };
+        let mut sum = 0.0;
+        for (n, c) in table.iter().enumerate() {
+            let at = [n % stride, n / stride];
+            sum += c * real(at[along]) * power(radii[0], at[0]) * power(radii[1], at[1]);
+        }
+        sum
+    }
+
+    /// Bounds of the derivatives of D1 or D2 (0, 1) or e (2) where |s| <= r1 and |t| <= r2, times the radii.
+    fn slopes_of(&self, k: usize, radii: [f64; 2], off: [f64; 3]) -> [f64; 2] {
         let least = 1.0 - self.weight(radii);
-        (0..2).all(|k| {
-            let both = (0..2)
-                .map(|d| (slope(&self.bounds[k], d) + off[k] * slope(&self.bounds[3], d)) / least);
-            both.sum::<f64>() < 0.999 * radii[k]
+        [0, 1].map(|d| {
+            let weights = self.slope(&self.bounds[3], d, radii);
+            (self.slope(&self.bounds[k], d, radii) + off[k] * weights) / least
         })
+    }
+
+    /// The largest share that D moves places with |s| <= r1 and |t| <= r2 by, measured in these: below 1 no two have the same y
+    /// and z.
+    fn moved(&self, radii: [f64; 2], off: [f64; 3]) -> f64 {
+        let of = |k: usize| self.slopes_of(k, radii, off).iter().sum::<f64>() / radii[k];
+        of(0).max(of(1))
     }
 
     fn weight(&self, radii: [f64; 2]) -> f64 {
@@ -405,29 +418,32 @@ impl Height for Patch {
         self.linear
     }
 
-    fn deviations(&self) -> (f64, [f64; SIZES.len()]) {
-        let of = |size: f64| self.square(size).map_or(f64::INFINITY, |(off, _)| off[2]);
-        let mut all = [f64::INFINITY; SIZES.len()];
-        for (off, size) in all.iter_mut().zip(SIZES) {
-            *off = of(size);
-            if !off.is_finite() {
+    fn deviations(&self) -> Deviations {
+        let mut sizes = [f64::INFINITY; SIZES.len()];
+        for (off, size) in sizes.iter_mut().zip(SIZES) {
+            let Some((found, _)) = self.square(size) else {
                 break;
-            }
+            };
+            *off = found[2];
         }
-        (self.off, all)
+        Deviations {
+            off: self.off,
+            steep: self.steep,
+            sizes,
+        }
     }
 
     fn at(&self, y: f64, z: f64) -> Option<f64> {
         let goal = self.to_parameters([y - self.origin[0], z - self.origin[1]]);
         let [mut s, mut t] = goal;
-        let size = goal[0].abs() + goal[1].abs();
+        let around = self.around_cell();
         for _ in 0..8 {
             let step = self.step([s, t], goal);
             s -= step.by[0];
             t -= step.by[1];
             let moved = step.by[0].abs() + step.by[1].abs();
             // The step after one of this size is rounding.
-            if moved <= 1e-8 * size {
+            if moved <= 1e-9 * around {
                 let height = self.height[0]
                     + self.height[1] * goal[0]
                     + self.height[2] * goal[1]
@@ -441,11 +457,11 @@ impl Height for Patch {
     fn slopes(&self, y: f64, z: f64) -> Option<[f64; 3]> {
         let goal = self.to_parameters([y - self.origin[0], z - self.origin[1]]);
         let [mut s, mut t] = goal;
-        let size = goal[0].abs() + goal[1].abs();
+        let around = self.around_cell();
         for _ in 0..8 {
             let step = self.step([s, t], goal);
             let moved = step.by[0].abs() + step.by[1].abs();
-            if moved > 1e-13 * size.max(1e-3 * self.around_cell()) {
+            if moved > 1e-13 * around {
                 s -= step.by[0];
                 t -= step.by[1];
                 continue;
