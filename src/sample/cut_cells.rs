@@ -33,7 +33,12 @@ impl LayerSampler<'_> {
                 let cell = if is_cut {
                     let centre = self.grid.centre(i, j, k);
                     let terms = self.terms_near(centre, reach);
-                    match self.cell(&terms, (centre, sides), error, &mut out.tally.ways.cells) {
+                    match self.cell(
+                        &terms,
+                        (centre, out.occupancy[n] != 0),
+                        (sides, error),
+                        &mut out.tally.ways.cells,
+                    ) {
                         Some(cell) => cell,
                         None => {
                             out.tally.uncut += 1;
@@ -41,7 +46,7 @@ impl LayerSampler<'_> {
                         }
                     }
                 } else if out.occupancy[n] != 0 {
-                    SOLID
+                    CutCell::SOLID
                 } else {
                     continue;
                 };
@@ -94,12 +99,12 @@ impl LayerSampler<'_> {
     fn cell(
         &self,
         terms: &Option<Vec<Term>>,
-        (centre, sides): (DVec3, DVec3),
-        error: f64,
+        (centre, inside): (DVec3, bool),
+        (sides, error): (DVec3, f64),
         ways: &mut [u64; 3],
     ) -> Option<CutCell> {
         let open = match terms.as_deref() {
-            None => return Some(SOLID),
+            None => return Some(CutCell::SOLID),
             Some([]) => return Some(CutCell::default()),
             Some(open) => open,
         };
@@ -110,7 +115,8 @@ impl LayerSampler<'_> {
             && let [one] = factors.as_slice()
             && let Some(body) = bodies[one.body].turned_region()
         {
-            let sheet = bodies[one.body].sheet_cell(one.complement, centre, sides, tolerance);
+            let sheet =
+                bodies[one.body].sheet_cell(one.complement, (centre, inside), sides, tolerance);
             if sheet.is_some() {
                 ways[0] += 1;
                 return sheet;
@@ -123,17 +129,6 @@ impl LayerSampler<'_> {
         Some(rows.cut_cell(tolerance))
     }
 }
-
-/// A cell that is wholly solid.
-const SOLID: CutCell = CutCell {
-    volume: 1.0,
-    first: DVec3::ZERO,
-    sides: [[1.0; 2]; 3],
-    area: 0.0,
-    boundary: DVec3::ZERO,
-    normal: DVec3::ZERO,
-    error: 0.0,
-};
 
 /// A quantity of a cut cell, where it is one.
 fn value(channel: Channel, cell: &CutCell) -> Option<f32> {

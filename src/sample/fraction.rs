@@ -201,7 +201,7 @@ impl FractionSampler {
                                     tally.ways.sections += 1;
                                     share
                                 }
-                                None => match body.sheet_share(shape, centre, goal) {
+                                None => match body.sheet_share(shape, (centre, inside), goal) {
                                     Some(share) => {
                                         tally.ways.sheets += 1;
                                         share

@@ -13,7 +13,7 @@ use super::block::Block;
 use super::crossed::CutCell;
 use super::ellipsoid::Ellipsoid;
 use super::fraction::CellShape;
-use super::height;
+use super::height::{self, Swept};
 use super::measure::{Measures, Moments};
 use super::patch_fraction::RowSheets;
 use super::patches::Patches;
@@ -212,39 +212,61 @@ impl Body {
         }
     }
 
-    /// The share of the voxel centred on `centre` that lies in the solid, where one smooth sheet of a turned body passes
-    /// it and the proved bound of the error is at most `goal`.
+    /// The share of the voxel centred on `centre` that lies in the solid, where no more than one smooth sheet of a turned body
+    /// passes it and the proved bound of the error is at most `goal`.
+    ///
+    /// * `inside`: whether the centre is in the solid.
     pub(crate) fn sheet_share(
         &self,
         voxel: &VoxelShape,
-        centre: DVec3,
+        (centre, inside): (DVec3, bool),
         goal: f64,
     ) -> Option<Integral> {
-        let (net, region) = height::swept(self.turned_region()?, voxel.sides, centre)?;
-        let found = height::share_of_patch(&net, net.across(), &region, goal)?;
+        let whole = Integral {
+            value: f64::from(u8::from(inside)),
+            error: 0.0,
+        };
+        let Swept::Sheet(net, region, axis) =
+            height::swept(self.turned_region()?, voxel.sides, centre)?
+        else {
+            return Some(whole);
+        };
+        let found = height::share_of_patch(&net, axis, &region, goal)?;
         let Integral { value, error } = found.share;
-        let value = if found.is_solid? { value } else { 1.0 - value };
-        Some(Integral {
-            value: value.clamp(0.0, 1.0),
-            error,
+        Some(match found.is_solid {
+            None => whole,
+            Some(below) => Integral {
+                value: if below { value } else { 1.0 - value }.clamp(0.0, 1.0),
+                error,
+            },
         })
     }
 
-    /// All that is asked of a cell that one smooth sheet of a turned body passes, or of what the body leaves of it, to an
-    /// estimated error of `goal`.
+    /// All that is asked of a cell that no more than one smooth sheet of a turned body passes, or of what the body leaves of it,
+    /// to an estimated error of `goal`.
+    ///
+    /// * `inside`: whether the centre is in what is asked for.
     pub(crate) fn sheet_cell(
         &self,
         is_complement: bool,
-        centre: DVec3,
+        (centre, inside): (DVec3, bool),
         sides: DVec3,
         goal: f64,
     ) -> Option<CutCell> {
-        let (mut net, region) = height::swept(self.turned_region()?, sides, centre)?;
+        let Swept::Sheet(mut net, region, axis) =
+            height::swept(self.turned_region()?, sides, centre)?
+        else {
+            return Some(if inside {
+                CutCell::SOLID
+            } else {
+                CutCell::default()
+            });
+        };
         if is_complement {
             net.sign = -net.sign;
         }
         let faces = [sides.y * sides.z, sides.z * sides.x, sides.x * sides.y];
-        height::cell_of_patch(&net, net.across(), &region, faces, goal)
+        height::cell_of_patch(&net, axis, &region, faces, goal)
     }
 
     /// Volume, area and moments, with estimates of their errors.

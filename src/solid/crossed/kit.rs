@@ -38,6 +38,19 @@ pub(crate) struct CutCell {
     pub(crate) error: f64,
 }
 
+impl CutCell {
+    /// A cell that is wholly solid.
+    pub(crate) const SOLID: Self = Self {
+        volume: 1.0,
+        first: DVec3::ZERO,
+        sides: [[1.0; 2]; 3],
+        area: 0.0,
+        boundary: DVec3::ZERO,
+        normal: DVec3::ZERO,
+        error: 0.0,
+    };
+}
+
 /// Volume and first moments; both sides; boundary, its first moments and normals.
 const KIT: usize = 13;
 

@@ -21,7 +21,7 @@ mod swept;
 mod tests;
 
 pub(super) use patch::{Below, Region, cell_of_patch, share_of_patch};
-pub(super) use swept::swept;
+pub(super) use swept::{Swept, swept};
 
 use crate::math::quadrature::Integral;
 use smallvec::SmallVec;

@@ -15,13 +15,16 @@ use smallvec::SmallVec;
 /// Halvings of a piece's parameter to what may come into the cell.
 const HALVINGS: u32 = 24;
 
+/// What of a turned body's surface comes into a voxel.
+pub(in super::super) enum Swept {
+    Nothing,
+    /// One sheet, in the voxel's coordinates, and the axis that it is most across.
+    Sheet(Net, Region, usize),
+}
+
 /// The one sheet of a turned body that comes into the voxel with those sides and that centre, in scene units; `None` where
-/// none or several do, or an end of a partial turn or the axis may.
-pub(in super::super) fn swept(
-    body: &Revolved,
-    sides: DVec3,
-    centre: DVec3,
-) -> Option<(Net, Region)> {
+/// several do, or an end of a partial turn or the axis may.
+pub(in super::super) fn swept(body: &Revolved, sides: DVec3, centre: DVec3) -> Option<Swept> {
     let frame = body.frame();
     let edges = DVec3::AXES.map(|e| frame.vector_to_local(e * sides));
     let local = frame.to_local(centre);
@@ -58,7 +61,12 @@ pub(in super::super) fn swept(
             several |= found.replace((part, range)).is_some();
         }
     });
-    let (part, range) = found.filter(|_| !several)?;
+    if several {
+        return None;
+    }
+    let Some((part, range)) = found else {
+        return Some(Swept::Nothing);
+    };
     let place = Place::new(edges, middle, local.error);
     // All of the voxel's azimuths.
     let turn = 1.3 * (ball / radius).asin();
@@ -93,7 +101,11 @@ pub(in super::super) fn swept(
         domain: [[0.0, 1.0], [-8.0, 9.0]],
         parts: [range, [0.0, 1.0]],
     };
-    Some((net, region))
+    let [dr, dz] = twin.slope(0.5 * (range[0] + range[1]));
+    let normal = DVec3::new(dz * along.x, dz * along.y, -dr);
+    let steep = edges.map(|e| e.dot(normal).abs());
+    let axis = (0..3).fold(0, |a, k| if steep[k] > steep[a] { k } else { a });
+    Some(Swept::Sheet(net, region, axis))
 }
 
 /// The parameters of a piece that may be in a box of the half-plane.

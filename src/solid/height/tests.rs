@@ -74,7 +74,9 @@ fn sheets_of_turned_bodies_are_what_circles_say() {
                 }
                 near += 1;
                 for complement in [false, true] {
-                    let Some(a) = body.sheet_cell(complement, centre, sides, GOAL) else {
+                    let Some(a) =
+                        body.sheet_cell(complement, (centre, inside != complement), sides, GOAL)
+                    else {
                         continue;
                     };
                     seen += 1;
@@ -120,7 +122,7 @@ fn shares_of_tilted_sheets_are_those_of_sections() {
                     continue;
                 }
                 let shape = body.voxel_shape(sides);
-                if let Some(share) = body.sheet_share(&shape, centre, 1e-9) {
+                if let Some(share) = body.sheet_share(&shape, (centre, inside), 1e-9) {
                     let other = body.fraction_within(&shape, centre, &[], 1e-11);
                     let off = (share.value - other.value).abs();
                     assert!(
