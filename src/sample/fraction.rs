@@ -201,16 +201,10 @@ impl FractionSampler {
                                     tally.ways.sections += 1;
                                     share
                                 }
-                                None => match body.sheet_share(shape, (centre, inside), goal) {
-                                    Some(share) => {
-                                        tally.ways.sheets += 1;
-                                        share
-                                    }
-                                    None => {
-                                        tally.ways.sections += 1;
-                                        body.fraction_within(shape, centre, &[], self.tolerance)
-                                    }
-                                },
+                                None => {
+                                    tally.ways.sections += 1;
+                                    body.fraction_within(shape, centre, &[], self.tolerance)
+                                }
                             };
                             tally.loose.count(1, share.error, self.error);
                             share.value

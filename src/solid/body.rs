@@ -212,36 +212,6 @@ impl Body {
         }
     }
 
-    /// The share of the voxel centred on `centre` that lies in the solid, where no more than one smooth sheet of a turned body
-    /// passes it and the proved bound of the error is at most `goal`.
-    ///
-    /// * `inside`: whether the centre is in the solid.
-    pub(crate) fn sheet_share(
-        &self,
-        voxel: &VoxelShape,
-        (centre, inside): (DVec3, bool),
-        goal: f64,
-    ) -> Option<Integral> {
-        let whole = Integral {
-            value: f64::from(u8::from(inside)),
-            error: 0.0,
-        };
-        let Swept::Sheet(net, region, axis) =
-            height::swept(self.turned_region()?, voxel.sides, centre)?
-        else {
-            return Some(whole);
-        };
-        let found = height::share_of_patch(&net, axis, &region, goal)?;
-        let Integral { value, error } = found.share;
-        Some(match found.is_solid {
-            None => whole,
-            Some(below) => Integral {
-                value: if below { value } else { 1.0 - value }.clamp(0.0, 1.0),
-                error,
-            },
-        })
-    }
-
     /// All that is asked of a cell that no more than one smooth sheet of a turned body passes, or of what the body leaves of it,
     /// to an estimated error of `goal`.
     ///
