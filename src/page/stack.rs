@@ -5,6 +5,7 @@ use super::source::{ChannelHead, Layers};
 use crate::error::Error;
 use crate::grid::Channel;
 use crate::io::exr::{DecodedSamples, SampleKind, decode_layer};
+use crate::io::format::plain;
 use crate::io::manifest::{ChannelRecord, FileRecord, Manifest};
 use crate::io::{IoError, open_regular};
 use std::io::{Read as _, Seek as _, SeekFrom};
@@ -91,7 +92,7 @@ impl Stack {
     }
 
     fn array(&self, ending: &str, head: &ChannelHead) -> Result<Array, Error> {
-        let name = format!("{}.{ending}", head.name);
+        let name = format!("{}.{ending}", plain(&head.name));
         let file = self.manifest.files.iter().find(|f| f.name == name);
         let file: &FileRecord = file.ok_or_else(|| {
             let reason = format!("its manifest lists no {name:?}; write the stack again");

@@ -15,9 +15,15 @@ class Slice {
     this.key = "";
   }
 
+  // The canvas in CSS pixels, of which there may be parts.
+  room() {
+    const r = this.canvas.getBoundingClientRect();
+    return [r.width, r.height];
+  }
+
   // Where the picture is on the canvas, in CSS pixels.
   frame() {
-    const w = this.canvas.clientWidth, h = this.canvas.clientHeight;
+    const [w, h] = this.room();
     const scale = Math.min(w / this.sides[0], h / this.sides[1]);
     const [pw, ph] = this.sides.map((v) => Math.max(1, v * scale));
     return { x: 0.5 * (w - pw), y: 0.5 * (h - ph), w: pw, h: ph };
@@ -70,11 +76,11 @@ class Slice {
 
   draw(channel) {
     const canvas = this.canvas, pixels = Math.min(devicePixelRatio || 1, 2);
-    const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+    const [w, h] = this.room();
     if (!w || !h) return;
     [canvas.width, canvas.height] = [Math.round(w * pixels), Math.round(h * pixels)];
     const context = canvas.getContext("2d");
-    context.scale(pixels, pixels);
+    context.scale(canvas.width / w, canvas.height / h);
     if (!channel || !channel.values) {
       context.fillStyle = css("--faint");
       context.font = "12px system-ui, sans-serif";
