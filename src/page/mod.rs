@@ -55,7 +55,7 @@ const TEXT: usize = 200_000;
 /// Distances up to so many spacings keep their bits where not all do.
 const BAND: f64 = 4.0;
 /// Pixels of the still picture.
-const STILL: [usize; 2] = [960, 720];
+const STILL: [usize; 2] = [720, 540];
 
 /// How a page is made.
 #[derive(Debug, Clone, Copy)]
@@ -497,4 +497,54 @@ fn framed(surface: Option<&Surface>, grid: &GridSpec) -> ([f64; 3], [f64; 2]) {
         .map(|(a, axis)| axis * (0.5 * (low[a] + high[a]) - middle.dot(axis)));
     let middle = middle + to.sum::<DVec3>();
     (middle.to_array(), [0, 1].map(|a| high[a] - low[a]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_is_rounded_or_left_out() {
+        let text = "schema = 1\ngrid = { resolution = 40 }\n[[solid]]\nkind = 'torus'\nmajor = 2\nminor = 1\n";
+        let scene = Scene::parse(text).expect("a scene");
+        let grid = scene.grid().expect("a grid");
+        let names = ["normal-x", "sdf", "occupancy", "fraction"];
+        let channels = scene.model().channels(&names).expect("channels");
+        let sampling = Sampling::new(&scene, &grid, &channels);
+        let sampler = LayerSampler::new(scene.assembly(), &grid, sampling.selection);
+        let source = Sampled {
+            sampler: &sampler,
+            scalars: &[],
+            shares: &[],
+            counts: None,
+        };
+        let lattice = Lattice::new(grid);
+        let kept = |room: usize| {
+            fitted(
+                &source,
+                &source,
+                &lattice,
+                &sampling.heads,
+                room,
+                2,
+                &|| false,
+            )
+            .expect("nothing stops it")
+        };
+        let (all, notices) = kept(usize::MAX);
+        assert!(notices.is_empty() && all.iter().all(|c| c.exact_within.is_none()));
+        let order: Vec<&str> = all.iter().map(|c| c.head.name.as_str()).collect();
+        assert_eq!(order, names);
+        // A byte too few for the distance.
+        let first = all[1..].iter().map(Stored::bytes).sum::<usize>() - 1;
+        let (some, notices) = kept(first);
+        let sdf = some.iter().find(|c| c.head.name == "sdf").expect("sdf");
+        let band = sdf.exact_within.expect("a band");
+        assert!((band - 4.0 * grid.spacing().x).abs() < 1e-12);
+        assert!(sdf.bytes() < all[1].bytes());
+        assert!(notices[0].contains("rounded to 10 bits"), "{notices:?}");
+        assert!(notices[1].starts_with("normal-x: left out"), "{notices:?}");
+        let (none, notices) = kept(0);
+        assert!(none.is_empty() && notices.len() == names.len());
+    }
 }

@@ -336,10 +336,12 @@ void main() {
     vec3 outer = directed(gradient(p - forward * 0.6, 0.6), -forward);
     n = outer;
 #ifndef FAST
-    n = directed(gradient(p + outer * 1.1, 0.6 + 0.05 * abs(iso)), outer);
+    n = directed(gradient(p + outer * 1.45, 0.6 + 0.05 * abs(iso)), outer);
 #endif
 #endif
-    if (dot(n, forward) > 0.0) n = normalize(n - forward * dot(n, forward) * 1.02);
+    // What is seen faces the camera, if barely.
+    float away = dot(n, forward);
+    if (away > -0.12) n = normalize(n - forward * (away + 0.12));
   }
   vec3 base = albedo(p, n, isCut);
 #ifdef CHANNEL
