@@ -24,6 +24,8 @@ const FIXED: u64 = 6 * page::MOST_BYTES as u64;
 /// A page and what is said of where it comes from.
 struct Made {
     page: Page,
+    /// What is to be said of fractions that are less near than promised.
+    loose: Option<String>,
     source: &'static str,
     scene: Option<String>,
     hash: Option<String>,
@@ -44,8 +46,9 @@ pub(super) fn run(
         of_scene(arguments, common, console)?
     };
     let page = &made.page;
-    for notice in page.notices() {
-        console.warn(notice);
+    let warnings: Vec<&String> = page.notices().iter().chain(&made.loose).collect();
+    for warning in &warnings {
+        console.warn(warning);
     }
     // Somebody else may have made it meanwhile.
     check_output(arguments)?;
@@ -67,7 +70,7 @@ pub(super) fn run(
         "stride": page.stride(),
         "channels": channels,
         "seconds": seconds,
-        "warnings": page.notices(),
+        "warnings": warnings,
     });
     let [nx, ny, nz] = page.dims();
     let text = format!(
@@ -131,6 +134,7 @@ fn of_scene(arguments: &View, common: &Common, console: &Console) -> Result<Made
     let (page, tally) = budget.while_watched(WHAT, LESS, console, make)?;
     voxelize::all_seen(&tally)?;
     Ok(Made {
+        loose: voxelize::said_of_fractions(&tally),
         page,
         source: "scene",
         scene: Some(scene.name().to_owned()),
@@ -183,6 +187,7 @@ fn of_stack(arguments: &View, common: &Common, console: &Console) -> Result<Made
     let page = budget.while_watched(WHAT, need.remedy, console, make)?;
     let g = manifest.grid;
     Ok(Made {
+        loose: None,
         page,
         source: "stack",
         scene: manifest.scene_name.clone(),

@@ -684,7 +684,7 @@ pub(super) fn all_seen(tally: &Tally) -> Result<(), Failure> {
 }
 
 /// What is to be said of fractions that are not as near as is promised.
-fn said_of_fractions(tally: &Tally) -> Option<String> {
+pub(super) fn said_of_fractions(tally: &Tally) -> Option<String> {
     let Loose { voxels, bound } = tally.loose;
     (voxels > 0).then(|| {
         let bound = rounded_up(bound);

@@ -197,9 +197,11 @@ pub fn of_scene(
     let sampling = Sampling::new(scene, grid, channels);
     let lattice = Lattice::new(*grid);
     let still = still(scene, cancel)?;
-    let surface = match scene.assembly().is_empty() {
-        true => None,
-        false => Some(drawn(scene, options, cancel)?),
+    // Of nothing every distance takes its time.
+    let surface = if scene.is_known_empty() {
+        None
+    } else {
+        Some(drawn(scene, options, cancel)?)
     };
     let shares = (sampling.shares.iter()).filter_map(|(_, id)| scene.assembly().of_material(*id));
     let shares: Vec<Assembly> = shares.collect();
@@ -236,7 +238,7 @@ pub fn of_scene(
     notices.splice(0..0, thinned(&lattice));
     notices.extend(scene.warnings().iter().cloned());
     notices.extend(scene.grid_warning(grid));
-    if surface.is_none() || scene.is_known_empty() {
+    if surface.is_none() {
         notices.push("nothing is left of the solids: there is no surface to draw".into());
     }
     let view = seen(scene, View::default(), cancel)?;

@@ -50,7 +50,7 @@ function showVoxel(at) {
     const v = pointer ? pointer.values[head.name] : null;
     const exact = v === null || isExact(head, v);
     const name = head.name === "material" && v ? model.materials.find((m) => m.id === v) : null;
-    const text = v === null ? (pointer ? "…" : "–") : `${exact ? "" : "≈ "}${head.kind === "float" ? single(v) : v}`;
+    const text = v === null ? (!pointer ? "–" : channelOf(head.name).loading ? "…" : "choose to read") : `${exact ? "" : "≈ "}${head.kind === "float" ? single(v) : v}`;
     value.textContent = name && name.name ? `${text} ${name.name}` : text;
     row.dataset.value = v === null ? "" : String(v);
     row.dataset.exact = String(exact);
