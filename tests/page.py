@@ -263,7 +263,8 @@ AS_LARGE_AS_STILL = """
   const still = document.getElementById('still'), style = document.getElementById('view').style;
   [style.aspectRatio, style.maxHeight] = ['auto', 'none'];
   [style.width, style.height] = [still.naturalWidth + 2 + 'px', still.naturalHeight + 2 + 'px'];
-  await new Promise((done) => setTimeout(done, 400));
+  const canvas = document.getElementById('solid');
+  for (let n = 0; n < 200 && canvas.width !== still.naturalWidth; n++) await new Promise((done) => setTimeout(done, 50));
   return still.src.split(',')[1];
 })()
 """

@@ -292,7 +292,9 @@ pub fn of_stack(
     let surface = match drawn {
         Some(head) => {
             let workers = options.workers;
-            Some(surface::store(&stack, &lattice, head, workers, cancel)?)
+            Some(surface::store(
+                &stack, &lattice, head, None, workers, cancel,
+            )?)
         }
         None => None,
     };
@@ -402,7 +404,9 @@ fn drawn(scene: &Scene, options: &PageOptions, cancel: Cancel<'_>) -> Result<Sur
         meaning: String::new(),
         kind: Kind::Float,
     };
-    surface::store(&source, &Lattice::new(grid), &head, options.workers, cancel)
+    let lattice = Lattice::new(grid);
+    let solid = Some(scene.assembly());
+    surface::store(&source, &lattice, &head, solid, options.workers, cancel)
 }
 
 /// Bytes that are left for channels, before they are written as text.

@@ -11,6 +11,17 @@
 //! ```
 //!
 //! Near the surface that is 1/256 of a spacing.
+//!
+//! Between samples the field is linear, so a wall that is thinner than a spacing may lie between samples that are all
+//! outside. In a scene's field such walls are made about a spacing thick: the exact distance at half a spacing below the
+//! surface tells how thick they are, and the values around them are lowered by half of what is missing.
+//!
+//! ```text
+//!   c outside ·          n  out of the solid, from the values that are further out
+//!   ----------q------    q = c - u n           the surface
+//!             p          p = q - n / 2         w = 1/2 - u(p)      the wall's thickness, where it is less than 1
+//!   -----------------
+//! ```
 
 use super::channels::{in_order, slab_layers};
 use super::codec::{self, Kind};
@@ -20,6 +31,7 @@ use crate::error::Error;
 use crate::grid::GridSpec;
 use crate::math::Aabb;
 use crate::picture::View;
+use crate::solid::Assembly;
 use glam::DVec3;
 
 /// Voxels along the longest side of a scene's field, the room around it included: the least that WebGL 2 promises.
@@ -89,12 +101,15 @@ fn number(value: f64) -> u32 {
 
 /// Stores the field that a channel makes.
 ///
+/// * `solid`: what the distances are of, where thin walls are to be drawn.
+///
 /// # Errors
 /// What `source` says, and [`Error::Interrupted`] when `cancel` does.
 pub(super) fn store<L: Layers>(
     source: &L,
     lattice: &Lattice,
     head: &ChannelHead,
+    solid: Option<&Assembly>,
     workers: usize,
     cancel: &(dyn Fn() -> bool + Sync),
 ) -> Result<Surface, Error> {
@@ -110,28 +125,48 @@ pub(super) fn store<L: Layers>(
     let layers = slab_layers(lattice);
     let size = [lattice.dims[0], lattice.dims[1]];
     let heads = std::slice::from_ref(head);
+    let value = |bits: u32| {
+        let stored = match head.kind {
+            Kind::Float => f64::from(f32::from_bits(bits)),
+            Kind::Uint => f64::from(bits),
+        };
+        match made {
+            Made::Distance => stored / unit,
+            Made::Share => 0.5 - stored,
+        }
+    };
+    // Layers beside a slab that its walls are looked for in.
+    let beside = if solid.is_some() { REACH } else { 0 };
     let one = |slab: usize, scratch: &mut L::Scratch| -> Result<_, Error> {
-        let mut seen = Seen::default();
-        let mut numbers = Vec::with_capacity(layers);
-        for k in slab * layers..lattice.dims[2].min((slab + 1) * layers) {
+        let own = slab * layers..lattice.dims[2].min((slab + 1) * layers);
+        let all = own.start.saturating_sub(beside)..lattice.dims[2].min(own.end + beside);
+        let mut values: Vec<Vec<f64>> = Vec::with_capacity(all.len());
+        for k in all.clone() {
             let layer = source.layer(lattice.layer(k), heads, scratch)?;
             if cancel() {
                 return Err(Error::Interrupted);
             }
             let shown = lattice.of_layer(layer.first().map_or(&[][..], Vec::as_slice));
-            let value = |bits: u32| {
-                let stored = match head.kind {
-                    Kind::Float => f64::from(f32::from_bits(bits)),
-                    Kind::Uint => f64::from(bits),
-                };
-                match made {
-                    Made::Distance => stored / unit,
-                    Made::Share => 0.5 - stored,
-                }
+            values.push(shown.into_iter().map(value).collect());
+        }
+        let mut seen = Seen::default();
+        let mut numbers = Vec::with_capacity(own.len());
+        for k in own {
+            let walls = Walls {
+                lattice,
+                values: &values,
+                first: all.start,
             };
-            let values: Vec<u32> = shown.into_iter().map(|bits| number(value(bits))).collect();
-            seen.add(lattice, k, &values);
-            numbers.push(values);
+            let layer = match solid {
+                Some(solid) => walls.thickened(solid, k),
+                None => values[k - all.start].clone(),
+            };
+            let layer: Vec<u32> = layer.into_iter().map(number).collect();
+            seen.add(lattice, k, &layer);
+            numbers.push(layer);
+            if cancel() {
+                return Err(Error::Interrupted);
+            }
         }
         Ok((codec::encode(Kind::Uint, size, &numbers), seen))
     };
@@ -150,6 +185,96 @@ pub(super) fn store<L: Layers>(
         unit,
         seen: seen.known(),
     })
+}
+
+/// Samples from a voxel within which its wall is looked for.
+const REACH: usize = 3;
+/// How thick walls are made, in spacings: linear interpolation does not miss that.
+const THICK: f64 = 1.15;
+
+/// Values around some layers, in spacings of cubes, to find thin walls in.
+struct Walls<'a> {
+    lattice: &'a Lattice,
+    values: &'a [Vec<f64>],
+    /// The layer of the first of them.
+    first: usize,
+}
+
+impl Walls<'_> {
+    fn at(&self, [i, j, k]: [usize; 3]) -> f64 {
+        self.values[k - self.first][j * self.lattice.dims[0] + i]
+    }
+
+    /// Layer `k`, with thin walls made thick.
+    fn thickened(&self, solid: &Assembly, k: usize) -> Vec<f64> {
+        let mut layer = self.values[k - self.first].clone();
+        let [nx, ny, nz] = self.lattice.dims;
+        let inner = |n: usize| REACH..n.saturating_sub(REACH);
+        if !inner(nz).contains(&k) {
+            return layer;
+        }
+        for j in inner(ny) {
+            for i in inner(nx) {
+                let u = layer[j * nx + i];
+                if (-0.7..2.0).contains(&u) {
+                    layer[j * nx + i] -= self.missing(solid, [i, j, k], u);
+                }
+            }
+        }
+        layer
+    }
+
+    /// Half of what the wall by a voxel lacks of being thick.
+    fn missing(&self, solid: &Assembly, voxel: [usize; 3], u: f64) -> f64 {
+        // Outward: along each axis from the neighbour that is further out, which no thin wall comes between.
+        let slope = |a: usize| {
+            let mut next = voxel;
+            next[a] += 1;
+            let up = self.at(next) - u;
+            next[a] -= 2;
+            let down = self.at(next) - u;
+            if up >= down { up } else { -down }
+        };
+        let outward = DVec3::from([0, 1, 2].map(slope)).normalize_or_zero();
+        let below = -outward * (u + 0.5);
+        // Where interpolation has it well inside the wall is thick enough.
+        if outward == DVec3::ZERO || self.between(voxel, below) <= -0.35 {
+            return 0.0;
+        }
+        let [i, j, k] = voxel;
+        let spacing = self.lattice.grid.spacing();
+        let point = self.lattice.grid.centre(i, j, k) + below * spacing;
+        let found = solid.signed_distance(point) / spacing.x;
+        let thickness = (0.5 - found).max(0.0);
+        // Thicker than can be told from here.
+        if thickness >= 0.98 {
+            return 0.0;
+        }
+        0.5 * (THICK - thickness) * (2.0 - u).min(1.0)
+    }
+
+    /// The value at a step from a voxel, less than [`REACH`] long, between the samples around it.
+    fn between(&self, voxel: [usize; 3], by: DVec3) -> f64 {
+        let floor = by.floor();
+        let share = by - floor;
+        #[allow(clippy::cast_possible_truncation, reason = "small whole numbers")]
+        let low = [0, 1, 2].map(|a| voxel[a].saturating_add_signed(floor[a] as isize));
+        let mut sum = 0.0;
+        for corner in 0..8_usize {
+            let mut at = low;
+            let mut weight = 1.0;
+            for a in 0..3 {
+                let upper = corner >> a & 1;
+                // The furthest has no share of what lies on a sample.
+                at[a] = (at[a] + upper).min(self.lattice.dims[a] - 1);
+                weight *= if upper == 1 { share[a] } else { 1.0 - share[a] };
+            }
+            if weight > 0.0 {
+                sum += weight * self.at(at);
+            }
+        }
+        sum
+    }
 }
 
 #[allow(clippy::cast_precision_loss, reason = "a small number")]

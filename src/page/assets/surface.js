@@ -40,7 +40,9 @@ class Field {
     const row = (q) => VALUES[d[q]] + (VALUES[d[q + dx]] - VALUES[d[q]]) * a;
     const near = row(p) + (row(p + dy) - row(p)) * b;
     const far = row(p + dz) + (row(p + dy + dz) - row(p + dz)) * b;
-    return near + (far - near) * c;
+    // Outside of the box it is further by the way to it.
+    const out = [x, y, z].map((v, axis) => v - clamp(v, this.low[axis], this.high[axis]));
+    return near + (far - near) * c + Math.hypot(...out);
   }
 
   // The same field with no more samples along a side than a texture may have.
@@ -114,7 +116,7 @@ function meets(o, d) {
       }
       return place(b);
     }
-    if (surfaceHead.distance && g > last && last <= older && last < 0.9 && older < Infinity) {
+    if (seeksWalls && g > last && last <= older && last < 0.9 && older < Infinity) {
       const thin = between(value, before + 0.5 * dip(value(before - 0.5), last, g));
       if (thin !== null) return place(thin);
     }
@@ -123,6 +125,8 @@ function meets(o, d) {
   }
   return null;
 }
+// In a stack's field there may be walls thinner than a spacing; in a scene's they have been made thicker.
+const seeksWalls = model.source === "stack" && surfaceHead && surfaceHead.distance;
 // A wall thinner than a spacing shows as a dip of the field that stays above zero. Away from it the field is smooth:
 // where it goes on from either side, as a parabola, to the dip says whether the wall is met. The place, or null.
 //
@@ -132,7 +136,7 @@ function meets(o, d) {
 function between(value, t) {
   const on = (side) => {
     const [a, b, c] = [1.25, 2.5, 3.75].map((d) => value(t + side * d));
-    return { near: a, there: 3 * a - 3 * b + c };
+    return { near: a, there: 3 * (a - b) + c };
   };
   const left = on(-1), right = on(1);
   if (left.there > 0 || right.there > 0 || left.near <= 0) return null;
@@ -193,8 +197,8 @@ uniform vec3 colours[16];
 out vec4 pixel;
 
 float g(vec3 p) {
-  vec3 at = (clamp(p, low, high) - low) / stepUp;
-  return texture(field, (at + 0.5) / dims).r - iso;
+  vec3 within = clamp(p, low, high), at = (within - low) / stepUp;
+  return texture(field, (at + 0.5) / dims).r + distance(p, within) - iso;
 }
 // Four samples at corners of a cube around the place.
 vec3 gradient(vec3 p, float e) {
@@ -310,7 +314,10 @@ void main() {
       float middle = before + 0.5 * clamp(lean / bend, -1.0, 1.0), bottom = last - 0.5 * lean * lean / bend;
       leastAt = bottom < least ? middle : leastAt;
       least = min(bottom, least);
-      float thin = between(o, middle);
+      float thin = -1.0;
+#ifdef WALLS
+      thin = between(o, middle);
+#endif
       isThin = thin > 0.0;
       isHit = isThin;
       older = last; last = v; before = t;
@@ -487,7 +494,7 @@ class Painter {
     if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
     const settings = this.settings(w, h);
     if (this.scout) this.explore(w, h, settings);
-    const words = [isFast && "FAST", !surfaceHead.distance && "SHARE"];
+    const words = [isFast && "FAST", !surfaceHead.distance && "SHARE", seeksWalls && "WALLS"];
     if (state.colour === "channel" && this.channel) words.push("CHANNEL");
     else if (this.hasMaterial) words.push("MATERIAL");
     const main = this.program(...words.filter(Boolean));
