@@ -12,7 +12,7 @@
 //!   fit are left out or, where they are distances, rounded away from the surface, and the page says so.
 //! * Grids with more than [`MOST_SIDE`] voxels along a side are thinned: every so manieth voxel is shown.
 //! * Names from files are text: nothing of them is markup, and the page's policy lets no script run but its own.
-//! * [`sheet`] is the frame of pages without scripts; reports have the same look by it.
+//! * [`sheet()`] is the frame of pages without scripts; reports have the same look by it.
 
 mod channels;
 mod codec;
