@@ -59,6 +59,7 @@
 //! * [`validate`]: the exact answers held against the triangles, the field against what a distance is.
 //! * [`converge`]: how the samples approach the solid as voxels become smaller.
 //! * [`picture`]: shaded views, sections and contact sheets, from the exact distance.
+//! * [`page`]: one HTML page that shows a solid, its voxels and its numbers; the frame of reports.
 //! * [`io`]: stacks in nine formats with their manifest, tables of points, files of triangles; it knows no geometry.
 //! * [`guide`]: pages for users of the command.
 //! * [`math`]: double-double numbers, Bernstein polynomials, quadrature, discs and polygons.
@@ -111,6 +112,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod nurbs;
+pub mod page;
 pub mod patch;
 pub mod picture;
 pub mod region;

@@ -188,7 +188,7 @@ fn is_complete(arguments: &[String]) -> bool {
     let out = &arguments[arguments.iter().position(|a| a == "-o").expect("an output") + 1];
     match arguments[0].as_str() {
         "voxelize" => verify_stack(out).is_ok_and(|report| report.is_intact()),
-        _ => names_in(out) == ["converge.csv", "converge.png"],
+        _ => names_in(out) == ["converge.csv", "converge.html", "converge.png"],
     }
 }
 

@@ -116,6 +116,8 @@ pub(super) enum Command {
     Export(Export),
     /// Draw the solid, shaded or as a section with distance isolines
     Render(Render),
+    /// Write one HTML page that shows the solid, its voxels and their values
+    View(View),
     /// Measure each stage's throughput against writing the same bytes
     Bench(Bench),
     /// Show what a finished stack holds, and verify its digests
@@ -364,10 +366,10 @@ pub(super) struct Converge {
     /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(super) memory_limit: Option<u64>,
-    /// Directory for converge.csv and converge.png
+    /// Directory for converge.csv, converge.png and the page converge.html
     #[arg(long, short, value_name = "DIR")]
     pub(super) output: Option<PathBuf>,
-    /// Replace the two files in DIR
+    /// Replace the three files in DIR
     #[arg(long)]
     pub(super) force: bool,
 }
@@ -470,6 +472,34 @@ pub(super) struct Render {
     /// Leave out scale bar, axes, names and colour bar
     #[arg(long)]
     pub(super) plain: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The page needs no network and no other file: open it in a browser. It draws the surface, turns, cuts and slices it, and
+shows the stored value of every channel under the pointer, with volume, area, bounds and digests beside it. It has 20 MB at
+most and says what it leaves out. DIR is a finished stack with files of exr, npy, raw or mhd.
+
+Examples: voxlathe view scenes/goblet.toml -o goblet.html --resolution 256
+          voxlathe view out/goblet -o goblet.html")]
+pub(super) struct View {
+    /// The scene (TOML, JSON by its ending, or - for TOML on standard input), or the directory of a finished stack
+    #[arg(value_name = "SCENE|DIR")]
+    pub(super) source: PathBuf,
+    /// File to write, .html
+    #[arg(long, short, value_name = "PAGE.html")]
+    pub(super) output: PathBuf,
+    #[command(flatten)]
+    pub(super) step: Step,
+    /// Channels to show; those of the scene's output with sdf, or all of a stack, without it
+    #[arg(long, value_name = "A,B", value_delimiter = ',')]
+    pub(super) channels: Vec<String>,
+    /// Most memory the process may take, as 512MiB, 2G or bytes; half of the machine's without it
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(super) memory_limit: Option<u64>,
+    /// Replace the file
+    #[arg(long)]
+    pub(super) force: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -14,6 +14,7 @@ use std::process::ExitCode;
 
 const TABLE: &str = "converge.csv";
 const PLOT: &str = "converge.png";
+const PAGE: &str = "converge.html";
 /// What drawing and compressing the plot takes.
 const PLOT_BYTES: u64 = 12 << 20;
 
@@ -26,7 +27,7 @@ pub(super) fn run(
     for warning in scene.warnings() {
         console.warn(warning);
     }
-    let names = [TABLE, PLOT];
+    let names = [TABLE, PLOT, PAGE];
     let output = arguments.output.as_deref();
     let writer = output
         .map(|path| StackDirectory::create_for(path, &names, arguments.force))
@@ -60,7 +61,10 @@ pub(super) fn run(
             .plot(scene.name(), scene.model().units.name())
             .to_png()?;
         let path = writer.path().to_path_buf();
-        for (name, bytes) in names.into_iter().zip([csv(&found).into_bytes(), png]) {
+        let units = scene.model().units.name();
+        let page = found.page(scene.name(), &scene.hash(), units, &png);
+        let contents = [csv(&found).into_bytes(), png, page.into_bytes()];
+        for (name, bytes) in names.into_iter().zip(contents) {
             writer.write_file(name, &bytes)?;
             files.push(path.join(name));
         }
@@ -86,7 +90,7 @@ pub(super) fn run(
 fn refused(error: IoError) -> Failure {
     match error {
         IoError::NotEmpty { path, .. } => Failure::usage(format!(
-            "{} is not empty; choose another directory, or add --force to replace {TABLE} and {PLOT} in it",
+            "{} is not empty; choose another directory, or add --force to replace {TABLE}, {PLOT} and {PAGE} in it",
             path.display()
         )),
         other => other.into(),

@@ -20,6 +20,7 @@ mod render;
 mod space;
 mod step;
 mod validate;
+mod view;
 mod voxelize;
 
 use arguments::{Arguments, Command};
@@ -73,6 +74,7 @@ fn execute(arguments: &Arguments, console: &Console) -> Result<ExitCode, Failure
         Command::Mesh(a) => mesh::run(a, common, console),
         Command::Export(a) => export::run(a, common, console),
         Command::Render(a) => render::run(a, common, console),
+        Command::View(a) => view::run(a, common, console),
         Command::Bench(a) => bench::run(a, common, console),
         Command::Info(a) => info::run(a, common, console),
         Command::Generate(a) => generate::run(a),

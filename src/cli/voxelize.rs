@@ -257,7 +257,7 @@ fn apply_flags(scene: &mut Scene, arguments: &Voxelize) -> Result<(), Failure> {
 }
 
 /// The channels that `--channels` names.
-fn channels(scene: &Scene, given: &[String]) -> Result<Vec<ChannelModel>, Failure> {
+pub(super) fn channels(scene: &Scene, given: &[String]) -> Result<Vec<ChannelModel>, Failure> {
     let names: Vec<&str> = given.iter().map(String::as_str).collect();
     scene.model().channels(&names).map_err(|(index, problem)| {
         let text = names[index];
@@ -490,7 +490,7 @@ fn kind(model: &ChannelModel) -> SampleKind {
 }
 
 /// Distances are stored as f32: the grid must not leave its range.
-fn check_f32_range(scene: &Scene, grid: &GridSpec) -> Result<(), Error> {
+pub(super) fn check_f32_range(scene: &Scene, grid: &GridSpec) -> Result<(), Error> {
     let [nx, ny, nz] = grid.dims();
     let (low, high) = (grid.centre(0, 0, 0), grid.centre(nx - 1, ny - 1, nz - 1));
     let bounds = scene.bounds();
@@ -670,7 +670,7 @@ fn materials(scene: &Scene, plan: &Plan) -> Result<Vec<Assembly>, Failure> {
 }
 
 /// Refuses what is asked of nearest points that are not known.
-fn all_seen(tally: &Tally) -> Result<(), Failure> {
+pub(super) fn all_seen(tally: &Tally) -> Result<(), Failure> {
     if tally.uncut > 0 {
         let voxels = tally.uncut;
         return Err(Failure::usage(format!(
@@ -688,7 +688,7 @@ fn all_seen(tally: &Tally) -> Result<(), Failure> {
 }
 
 /// What is to be said of fractions that are not as near as is promised.
-fn said_of_fractions(tally: &Tally) -> Option<String> {
+pub(super) fn said_of_fractions(tally: &Tally) -> Option<String> {
     let Loose { voxels, bound } = tally.loose;
     (voxels > 0).then(|| {
         let bound = rounded_up(bound);

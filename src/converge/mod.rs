@@ -9,6 +9,7 @@
 //! voxel, in a sequence that fills the voxel evenly (Roberts 2018, R₃).
 
 mod fit;
+mod page;
 mod plot;
 
 pub use fit::order;

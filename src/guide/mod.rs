@@ -3,6 +3,9 @@
 #[doc = include_str!("formats.md")]
 pub mod formats {}
 
+#[doc = include_str!("page.md")]
+pub mod page {}
+
 #[doc = include_str!("quantities.md")]
 pub mod quantities {}
 

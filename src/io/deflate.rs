@@ -24,6 +24,11 @@ pub(super) fn piece(bytes: &[u8]) -> Vec<u8> {
 /// An empty last block, which ends a stream of pieces.
 pub(super) const LAST: [u8; 2] = [3, 0];
 
+/// A whole stream of raw deflate.
+pub(crate) fn raw(bytes: &[u8]) -> Vec<u8> {
+    RAW.with_borrow_mut(|deflate| deflated(bytes, deflate, FlushCompress::Finish))
+}
+
 /// A zlib stream.
 pub(super) fn zlib(bytes: &[u8]) -> Vec<u8> {
     ZLIB.with_borrow_mut(|deflate| deflated(bytes, deflate, FlushCompress::Finish))
@@ -79,6 +84,11 @@ mod tests {
         reader.read_to_end(&mut found).unwrap();
         assert_eq!(found, pieces.concat());
         for one in &pieces {
+            let stream = raw(one);
+            let mut found = Vec::new();
+            let mut reader = flate2::bufread::DeflateDecoder::new(&stream[..]);
+            reader.read_to_end(&mut found).unwrap();
+            assert_eq!(found, *one);
             let stream = zlib(one);
             let mut found = Vec::new();
             let mut reader = flate2::bufread::ZlibDecoder::new(&stream[..]);

@@ -443,7 +443,7 @@ impl Description {
 }
 
 /// The name of a file, or part of one, that any system takes.
-fn plain(name: &str) -> String {
+pub(crate) fn plain(name: &str) -> String {
     /// Bytes of a name at most.
     const LONGEST: usize = 100;
     let keep = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');

@@ -14,7 +14,8 @@
 //! Equal input gives equal bytes: no times, no random names, no map order reaches a file. A file
 //! appears under its final name only when it is whole and synced.
 
-mod deflate;
+pub(crate) mod base64;
+pub(crate) mod deflate;
 pub mod directory;
 #[cfg_attr(
     not(feature = "cli"),

@@ -58,6 +58,16 @@ impl View {
         self.elevation
     }
 
+    /// The unit vectors along the picture's right and up.
+    pub(crate) fn plane(&self) -> (DVec3, DVec3) {
+        let (sa, ca) = self.azimuth.to_radians().sin_cos();
+        let right = DVec3::new(-sa, ca, 0.0);
+        (
+            right,
+            Self::direction(self.azimuth, self.elevation).cross(right),
+        )
+    }
+
     /// The unit vector to a point at infinity, in these angles.
     pub(super) fn direction(azimuth: f64, elevation: f64) -> DVec3 {
         let (sa, ca) = azimuth.to_radians().sin_cos();
@@ -94,11 +104,10 @@ pub(super) struct Camera {
 impl Camera {
     pub(super) fn new(view: View, centre: DVec3, scale: f64, size: [f64; 2]) -> Self {
         let to_camera = View::direction(view.azimuth, view.elevation);
-        let (sa, ca) = view.azimuth.to_radians().sin_cos();
-        let right = DVec3::new(-sa, ca, 0.0);
+        let (right, up) = view.plane();
         Self {
             right,
-            up: to_camera.cross(right),
+            up,
             forward: -to_camera,
             centre,
             scale,

@@ -38,7 +38,13 @@ const MATERIALS: [[u8; 3]; 7] = [
 /// The colour of a material, by its place among the materials of the scene.
 #[must_use]
 pub(super) fn material(place: usize) -> Linear {
-    linear(MATERIALS[place % MATERIALS.len()])
+    linear(material_bytes(place))
+}
+
+/// The same as sRGB bytes.
+#[must_use]
+pub(crate) fn material_bytes(place: usize) -> [u8; 3] {
+    MATERIALS[place % MATERIALS.len()]
 }
 
 /// Linear light of sRGB bytes.

@@ -33,6 +33,9 @@ pub use contact::contact_sheet;
 pub use error::PictureError;
 pub use field::Cut;
 pub use plot::{Panel, Series, log_plot};
+pub(crate) use render::seen;
 pub use render::{MAX_LINES, MAX_PIXELS, MAX_SIDE, RenderOptions, render};
 pub use section::{Plane, PlaneAxis, SectionOptions, section};
 pub use ticks::round_step;
+
+pub(crate) use colour::material_bytes;

@@ -194,9 +194,55 @@ fn frame(
     cancel: Cancel<'_>,
 ) -> Result<Camera, Error> {
     let size = [length(options.width), length(options.height)];
+    let (coarse, [low, high]) = seen_cells(field, options.view, cancel)?;
+    let written = options.annotations && annotate::has_room(options.width, options.height);
+    let below = if written {
+        let size = size.map(single);
+        annotate::band(size, &annotate::materials(scene, field))
+    } else {
+        0.0
+    };
+    let room = [0.88 * size[0], (0.90 * size[1] - below).max(0.5 * size[1])];
+    let camera = coarse.resized(size);
+    let shift = |p: [f64; 2]| {
+        // From cells to the pixels of the picture that shows the whole square.
+        let factor = coarse.scale() / camera.scale();
+        [0, 1].map(|a| 0.5 * size[a] + (p[a] - 0.5 * CELLS) * factor)
+    };
+    Ok(camera
+        .framed(shift(low), shift(high), room)
+        .lowered(0.4 * below))
+}
+
+/// The part of a view that shows the solid: its middle, a point in space, and its width and height in scene units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seen {
+    pub(crate) middle: DVec3,
+    pub(crate) extent: [f64; 2],
+}
+
+/// What a picture shows of a scene's solid before it is given room around it. A picture without annotations is
+/// 0.88 of its width or 0.90 of its height as large, whichever is less.
+///
+/// # Errors
+/// [`Error::Interrupted`] when `cancel` says so.
+pub(crate) fn seen(scene: &Scene, view: View, cancel: Cancel<'_>) -> Result<Seen, Error> {
+    let field = Field::new(scene.assembly(), None);
+    let (coarse, [low, high]) = seen_cells(&field, view, cancel)?;
+    let middle = coarse.point(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]));
+    let extent = [0, 1].map(|a| (high[a] - low[a]) * coarse.scale());
+    Ok(Seen { middle, extent })
+}
+
+/// A camera of few cells, and the box of those in which the solid is seen.
+fn seen_cells(
+    field: &Field<'_>,
+    view: View,
+    cancel: Cancel<'_>,
+) -> Result<(Camera, [[f64; 2]; 2]), Error> {
     let middle = 0.5 * (field.bounds.min + field.bounds.max);
     // A square around the box from any side.
-    let coarse = Camera::new(options.view, middle, field.size / CELLS, [CELLS; 2]);
+    let coarse = Camera::new(view, middle, field.size / CELLS, [CELLS; 2]);
     let back = field.size * 2.0;
     let radius = std::f64::consts::FRAC_1_SQRT_2 * coarse.scale();
     #[allow(
@@ -236,23 +282,7 @@ fn frame(
     if low[0] > high[0] {
         (low, high) = ([0.0; 2], [CELLS; 2]);
     }
-    let written = options.annotations && annotate::has_room(options.width, options.height);
-    let below = if written {
-        let size = size.map(single);
-        annotate::band(size, &annotate::materials(scene, field))
-    } else {
-        0.0
-    };
-    let room = [0.88 * size[0], (0.90 * size[1] - below).max(0.5 * size[1])];
-    let camera = coarse.resized(size);
-    let shift = |p: [f64; 2]| {
-        // From cells to the pixels of the picture that shows the whole square.
-        let factor = coarse.scale() / camera.scale();
-        [0, 1].map(|a| 0.5 * size[a] + (p[a] - 0.5 * CELLS) * factor)
-    };
-    Ok(camera
-        .framed(shift(low), shift(high), room)
-        .lowered(0.4 * below))
+    Ok((coarse, [low, high]))
 }
 
 /// What a ray saw.

@@ -272,6 +272,14 @@ impl Scene {
         known.then_some(volume)
     }
 
+    /// The area of the composite's whole boundary in squared scene units, within the same work.
+    #[must_use]
+    pub fn area_beside_sampling(&self) -> Option<Integral> {
+        let area = self.assembly.moments_within(BESIDE_SAMPLING)?.area;
+        let known = area.error <= POOR * area.value || area.value == 0.0;
+        known.then_some(area)
+    }
+
     /// Whether nothing is left of the solids, as far as that is known.
     #[must_use]
     pub fn is_known_empty(&self) -> bool {

@@ -1,6 +1,7 @@
 //! The report as a page that needs no other file.
 
 use super::Report;
+use crate::page::{escaped, mark, sheet, table};
 use std::fmt::Write;
 
 /// What a page says of where a report comes from.
@@ -18,29 +19,23 @@ pub struct Heading<'a> {
     pub spacing: [f64; 3],
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}\
-h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}table{border-collapse:collapse;width:100%}\
-th,td{text-align:left;padding:.3rem .6rem;border-bottom:1px solid #ddd;font-variant-numeric:tabular-nums}\
-.ok{color:#0b6e4f}.bad{color:#b3261e;font-weight:600}code{font-size:.85em}\
-@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}th,td{border-color:#333}.ok{color:#6cc7a5}.bad{color:#ff8a80}}";
-
 /// The report as a self-contained HTML page.
 #[must_use]
 pub fn page(report: &Report, heading: &Heading) -> String {
-    let title = format!("voxlathe validate: {}", escaped(heading.scene));
+    let title = format!("voxlathe validate: {}", heading.scene);
     let [nx, ny, nz] = heading.dims;
     let units = heading.units;
+    let line = format!("{nx} × {ny} × {nz} voxels of {:?} {units}", heading.spacing);
+    let (class, verdict) = if report.is_ok() {
+        (
+            "ok",
+            "Everything agrees, or differs within the proven chord error.",
+        )
+    } else {
+        ("bad", "There are differences that nothing explains.")
+    };
     let mut html = format!(
-        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n\
-         <title>{title}</title>\n<style>{STYLE}</style>\n<h1>{title}</h1>\n\
-         <p class=\"{}\">{}</p>\n<p>{nx} × {ny} × {nz} voxels of {:?} {units}; scene <code>{}</code></p>\n",
-        if report.is_ok() { "ok" } else { "bad" },
-        if report.is_ok() {
-            "Everything agrees, or differs within the proven chord error."
-        } else {
-            "There are differences that nothing explains."
-        },
-        heading.spacing,
+        "<section class=\"card\"><p class=\"verdict {class}\">{verdict}</p>\n<p>scene <code>{}</code></p></section>\n",
         escaped(heading.hash)
     );
     html += &table(
@@ -108,7 +103,7 @@ pub fn page(report: &Report, heading: &Heading) -> String {
     html += &table("Distance", &["check", "looked at", "failed", ""], &checks);
     let _ = writeln!(
         html,
-        "<p>Largest ||∇φ| − 1| away from the medial axis {:.2e}; largest difference from the distance to the triangles {:.2e} {units}.</p>",
+        "<section class=\"card\"><p>Largest ||∇φ| − 1| away from the medial axis {:.2e}; largest difference from the distance to the triangles {:.2e} {units}.</p></section>",
         f.gradient_max_error, f.distance_max_error
     );
     let points: Vec<Vec<String>> = report
@@ -160,53 +155,9 @@ pub fn page(report: &Report, heading: &Heading) -> String {
             &violations,
         );
     }
-    html + "</html>\n"
+    sheet(&title, &line, &html)
 }
 
 fn voxel(voxel: Option<[usize; 3]>) -> String {
     voxel.map_or_else(|| "—".to_owned(), |v| format!("{v:?}"))
-}
-
-fn mark(good: bool) -> String {
-    let (class, text) = if good { ("ok", "yes") } else { ("bad", "no") };
-    format!("<span class=\"{class}\">{text}</span>")
-}
-
-fn table(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
-    let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| -> String {
-        cells.map(|c| format!("<{tag}>{c}</{tag}>")).collect()
-    };
-    let mut html = format!("<h2>{title}</h2>\n<table>\n<tr>");
-    html += &cells("th", &mut head.iter().copied());
-    html += "</tr>\n";
-    for row in rows {
-        let _ = writeln!(
-            html,
-            "<tr>{}</tr>",
-            cells("td", &mut row.iter().map(String::as_str))
-        );
-    }
-    html + "</table>\n"
-}
-
-/// Text that means nothing to HTML.
-fn escaped(text: &str) -> String {
-    let one = |c: char| match c {
-        '&' => "&amp;".to_owned(),
-        '<' => "&lt;".to_owned(),
-        '>' => "&gt;".to_owned(),
-        '"' => "&quot;".to_owned(),
-        _ => c.to_string(),
-    };
-    text.chars().map(one).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_text() {
-        assert_eq!(escaped("<b>&\"x\""), "&lt;b&gt;&amp;&quot;x&quot;");
-    }
 }

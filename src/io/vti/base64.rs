@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::head::{self, Held};
+use crate::io::base64::encode;
 use crate::io::error::IoError;
 use crate::io::format::{Description, Format, Layer, little_endian, record};
 use crate::io::manifest::FileRecord;
@@ -123,17 +124,6 @@ impl Digits {
     }
 }
 
-/// The digits of whole groups.
-fn encode(bytes: &[u8], digits: &mut [u8]) {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (three, four) in bytes.chunks_exact(3).zip(digits.chunks_exact_mut(4)) {
-        let bits = u32::from_be_bytes([0, three[0], three[1], three[2]]);
-        for (digit, shift) in four.iter_mut().zip([18, 12, 6, 0]) {
-            *digit = DIGITS[(bits >> shift & 63) as usize];
-        }
-    }
-}
-
 impl Format for Inline {
     fn layer(&self, _files: &StagedFiles, layer: &Layer<'_>) -> Result<(), IoError> {
         for (array, (_, samples)) in self.arrays.iter().zip(layer.channels) {
@@ -150,30 +140,8 @@ impl Format for Inline {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::*;
-
     /// The digits of bytes that are all there.
     pub(in super::super) fn plain(bytes: &[u8]) -> String {
-        let mut padded = bytes.to_vec();
-        padded.resize(bytes.len().next_multiple_of(3), 0);
-        let mut digits = vec![0; padded.len() / 3 * 4];
-        encode(&padded, &mut digits);
-        let end = digits.len() - (padded.len() - bytes.len());
-        digits[end..].fill(b'=');
-        String::from_utf8(digits).unwrap()
-    }
-
-    #[test]
-    fn digits_are_those_of_rfc_4648() {
-        for (bytes, digits) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(plain(bytes.as_bytes()), digits);
-        }
-        assert_eq!(plain(&[255, 254, 62 << 2]), "//74");
+        String::from_utf8(crate::io::base64::text(bytes)).unwrap()
     }
 }
