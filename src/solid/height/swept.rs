@@ -16,6 +16,7 @@ use smallvec::SmallVec;
 const HALVINGS: u32 = 24;
 
 /// What of a turned body's surface comes into a voxel.
+#[allow(clippy::large_enum_variant, reason = "taken apart where it is made")]
 pub(in super::super) enum Swept {
     Nothing,
     /// One sheet, in the voxel's coordinates, and the axis that it is most across.
