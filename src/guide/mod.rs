@@ -1,5 +1,8 @@
 //! The guide: what a user of the command meets, a page for each subject.
 
+#[doc = include_str!("cut_cells.md")]
+pub mod cut_cells {}
+
 #[doc = include_str!("formats.md")]
 pub mod formats {}
 
