@@ -134,9 +134,14 @@ impl FractionSampler {
         let mut shares = vec![Share::Nothing; bodies.len()];
         let mut sum = 0.0;
         let first = j * out.len();
-        let sheets = bodies.iter().zip(&self.shapes);
-        let sheets: Vec<Option<RowSheets>> = sheets
-            .map(|(body, shape)| body.row_sheets(shape, grid.centre(0, j, k), out.len()))
+        let sheets: Vec<Option<RowSheets>> = bodies
+            .iter()
+            .enumerate()
+            .map(|(b, body)| {
+                let is_known = scratch.shares.get(b).is_some_and(Option::is_some);
+                let of = || body.row_sheets(&self.shapes[b], grid.centre(0, j, k), out.len());
+                (!is_known).then(of).flatten()
+            })
             .collect();
         let known = |b: usize, i: usize| Some(scratch.shares.get(b)?.as_ref()?[first + i]);
         for (i, value) in out.iter_mut().enumerate() {

@@ -25,58 +25,40 @@ const FLAT: f64 = 1e-11;
 /// The first rule that is tried, by its place.
 const FIRST: usize = 2;
 
-/// A cell below a sheet. Lengths in the cell's sides, from its centre; areas and normals in those of [`Faces`].
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Kit {
-    pub(super) volume: f64,
-    pub(super) first: DVec3,
-    pub(super) sides: [[f64; 2]; 3],
-    pub(super) area: f64,
-    pub(super) boundary: DVec3,
-    /// Up, out of what is below.
-    pub(super) normal: DVec3,
-    /// As [`CutCell::error`].
-    pub(super) error: f64,
-}
-
-impl Kit {
-    /// The cell of a solid that is below the sheet or above it, x, y and z being these of its axes.
-    pub(super) fn cell(&self, is_solid_below: bool, axes: [usize; 3]) -> CutCell {
-        let back = |v: DVec3| {
-            let mut of = DVec3::ZERO;
-            for (k, axis) in axes.into_iter().enumerate() {
-                of[axis] = v[k];
-            }
-            of
-        };
-        let mut sides = self.sides;
+/// The cell of a solid that is below a sheet or above it, given the cell below it with x, y and z these of its axes.
+pub(super) fn turned(below: &CutCell, is_solid_below: bool, axes: [usize; 3]) -> CutCell {
+    let back = |v: DVec3| {
+        let mut of = DVec3::ZERO;
         for (k, axis) in axes.into_iter().enumerate() {
-            sides[axis] = self.sides[k];
+            of[axis] = v[k];
         }
-        let mut cell = CutCell {
-            volume: self.volume,
-            first: back(self.first),
-            sides,
-            area: self.area,
-            boundary: back(self.boundary),
-            normal: back(self.normal),
-            error: self.error,
-        };
-        if !is_solid_below {
-            // The moments of the whole cell are 0.
-            cell.volume = 1.0 - cell.volume;
-            cell.first = -cell.first;
-            cell.sides = cell.sides.map(|pair| pair.map(|s| 1.0 - s));
-            cell.normal = -cell.normal;
-        }
-        cell
+        of
+    };
+    let mut sides = below.sides;
+    for (k, axis) in axes.into_iter().enumerate() {
+        sides[axis] = below.sides[k];
     }
+    let mut cell = CutCell {
+        first: back(below.first),
+        sides,
+        boundary: back(below.boundary),
+        normal: back(below.normal),
+        ..*below
+    };
+    if !is_solid_below {
+        // The moments of the whole cell are 0.
+        cell.volume = 1.0 - cell.volume;
+        cell.first = -cell.first;
+        cell.sides = cell.sides.map(|pair| pair.map(|s| 1.0 - s));
+        cell.normal = -cell.normal;
+    }
+    cell
 }
 
 /// Areas of the cell's sides across x, y and z.
 pub(in super::super) type Faces = [f64; 3];
 
-/// The cell below a sheet, its sums to an estimated error of `goal`; `None` where that is not reached.
+/// The cell below a sheet, its normal up out of what is below, its sums to an estimated error of `goal`; `None` where that is not reached.
 ///
 /// * `is_solid_below`: or above, which tells whose the surface in a side of the cell is.
 pub(super) fn kit(
@@ -84,7 +66,7 @@ pub(super) fn kit(
     faces: Faces,
     is_solid_below: bool,
     goal: f64,
-) -> Option<Kit> {
+) -> Option<CutCell> {
     let sheet = Sheet::new(height);
     let spread = 0.5 * (sheet.b + sheet.c.abs()) + sheet.off;
     let (low, high) = (sheet.a - spread, sheet.a + spread);
@@ -130,14 +112,14 @@ pub(super) fn kit(
 }
 
 /// A flat sheet in a lower (-½) or upper side, counted as boundary or not.
-fn in_side(side: f64, is_boundary: bool, faces: Faces) -> Kit {
+fn in_side(side: f64, is_boundary: bool, faces: Faces) -> CutCell {
     let full = if side > 0.0 { 1.0 } else { 0.0 };
     let counted = if is_boundary { faces[0] } else { 0.0 };
     // The interior of the solid does not hold what bounds it.
     let far = if is_boundary { 1.0 - full } else { full };
     let mut sides = [[full; 2]; 3];
     sides[0] = if side > 0.0 { [1.0, far] } else { [far, 0.0] };
-    Kit {
+    CutCell {
         volume: full,
         first: DVec3::ZERO,
         sides,
@@ -149,7 +131,7 @@ fn in_side(side: f64, is_boundary: bool, faces: Faces) -> Kit {
 }
 
 /// The sums in the cell's own axes.
-fn made<H>(sheet: &Sheet<'_, H>, sums: &[f64; SUMS], error: f64) -> Kit {
+fn made<H>(sheet: &Sheet<'_, H>, sums: &[f64; SUMS], error: f64) -> CutCell {
     let vector = |first: usize| {
         let [x, y, z] = [sums[first], sums[first + 1] * sheet.sign, sums[first + 2]];
         if sheet.is_swapped {
@@ -169,7 +151,7 @@ fn made<H>(sheet: &Sheet<'_, H>, sums: &[f64; SUMS], error: f64) -> Kit {
     } else {
         [pair(4), along, across]
     };
-    Kit {
+    CutCell {
         volume: sums[0].clamp(0.0, 1.0),
         first: vector(1),
         sides,

@@ -17,7 +17,7 @@
 
 use super::super::crossed::CutCell;
 use super::super::flux::Net;
-use super::kit::{Faces, kit};
+use super::kit::{Faces, kit, turned};
 use super::{Deviations, Height, SIZES};
 use crate::math::quadrature::Integral;
 use crate::math::tetrahedra::{HalfSpace, box_share_under};
@@ -114,14 +114,14 @@ pub(in super::super) fn cell_of_patch(
     faces: Faces,
     goal: f64,
 ) -> Option<CutCell> {
-    let (axes, turned) = across(net, axis);
-    let patch = Patch::new(&turned, region)?;
+    let (axes, net) = across(net, axis);
+    let patch = Patch::new(&net, region)?;
     if !patch.is_over_face {
         return None;
     }
-    let mut kit = kit(&patch, axes.map(|k| faces[k]), patch.is_below, goal)?;
-    kit.error += patch.rounding();
-    Some(kit.cell(patch.is_below, axes))
+    let mut below = kit(&patch, axes.map(|k| faces[k]), patch.is_below, goal)?;
+    below.error += patch.rounding();
+    Some(turned(&below, patch.is_below, axes))
 }
 
 /// The axes that become x, y and z, and the net in them.
