@@ -898,6 +898,69 @@ const PIECES: &[&str] = &[
     "2147483647",
 ];
 
+/// A shipped scene without comments, and where its numbers are.
+fn numbers_of(name: &str) -> (String, Vec<std::ops::Range<usize>>) {
+    let text = fs::read_to_string(shipped(name)).expect("a scene");
+    let lines = text.lines().filter(|l| !l.starts_with('#'));
+    let text: String = lines.map(|l| format!("{l}\n")).collect();
+    let between = |c: char| " ,[]{}=\n".contains(c);
+    let mut numbers = Vec::new();
+    let mut at = 0;
+    for piece in text.split_inclusive(between) {
+        let word = piece.trim_end_matches(between);
+        if word.parse::<f64>().is_ok() {
+            numbers.push(at..at + word.len());
+        }
+        at += piece.len();
+    }
+    (text, numbers)
+}
+
+/// Every number of every shipped scene, one at a time. `VOXLATHE_SCENES` names those to take, by what their names begin with.
+#[test]
+#[ignore = "minutes: every number of every scene"]
+fn every_number_is_moved_by_much_and_by_little() {
+    let only = std::env::var("VOXLATHE_SCENES").unwrap_or_default();
+    let (mut count, mut slowest) = (0, (0.0, String::new()));
+    for name in shipped_names().iter().filter(|n| n.starts_with(&only)) {
+        let (text, numbers) = numbers_of(name);
+        for range in numbers {
+            let value: f64 = text[range.clone()].parse().expect("a number");
+            let factors = [
+                0.0,
+                -1.0,
+                1e-9,
+                1e9,
+                1.0 + 1e-12,
+                1.0 - 1e-12,
+                1.0 + 1e-10,
+                1.0 + 1e-8,
+                0.7,
+                1.3,
+            ];
+            for factor in factors {
+                let mut text = text.clone();
+                text.replace_range(range.clone(), &format!("{:?}", value * factor));
+                let case = format!("{name}: {value} at {} times {factor:?}", range.start);
+                let begun = std::time::Instant::now();
+                let _ = survives(&case, text);
+                let took = begun.elapsed().as_secs_f64();
+                count += 1;
+                if took > 3.0 {
+                    println!("{case}: {took:.1} s");
+                }
+                if took > slowest.0 {
+                    slowest = (took, case);
+                }
+            }
+        }
+    }
+    println!(
+        "{count} scenes; the slowest took {:.1} s: {}",
+        slowest.0, slowest.1
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         failure_persistence: None,
@@ -948,18 +1011,7 @@ proptest! {
         ]), 1..4),
     ) {
         let names = shipped_names();
-        let path = shipped(&names[scene % names.len()]);
-        let text = fs::read_to_string(path).expect("a scene");
-        let text: String = text.lines().filter(|l| !l.starts_with('#')).map(|l| format!("{l}\n")).collect();
-        let mut numbers: Vec<std::ops::Range<usize>> = Vec::new();
-        let mut at = 0;
-        for piece in text.split_inclusive(|c: char| " ,[]{}=\n".contains(c)) {
-            let word = piece.trim_end_matches(|c: char| " ,[]{}=\n".contains(c));
-            if word.parse::<f64>().is_ok() {
-                numbers.push(at..at + word.len());
-            }
-            at += piece.len();
-        }
+        let (text, numbers) = numbers_of(&names[scene % names.len()]);
         let mut text = text;
         let mut chosen: Vec<(std::ops::Range<usize>, f64)> =
             changes.iter().map(|(i, factor)| (i.get(&numbers).clone(), *factor)).collect();

@@ -389,3 +389,67 @@ fn a_flange_sums_to_its_volume() {
         assert!(error.abs() <= bound + 1e-12, "{n}: {error:e}");
     }
 }
+
+/// A shaft, and a ring on it whose bore widens by `gap` over its length, about an axis.
+fn nearly_fitting(axis: &str, gap: f64, seat: f64) -> String {
+    let bore = 10.0 + gap;
+    format!(
+        "schema = 1\n[grid]\nresolution = 8\n\
+         [profiles.shaft]\nboundary = 'to-axis'\n\
+         curves = [{{ kind = 'polyline', points = [[10, 0], [10, 90]] }}]\n\
+         [profiles.ring]\n\
+         curves = [{{ kind = 'polyline', points = [[{bore:?}, 74], [10, {seat:?}], [34, 44], [34, 60], [18, 74], [{bore:?}, 74]] }}]\n\
+         [profiles.hole]\nboundary = 'to-axis'\n\
+         curves = [{{ kind = 'polyline', points = [[4, -40], [4, 40]] }}]\n\
+         [[solid]]\nkind = 'revolve'\nprofile = 'shaft'\naxis = {{ direction = {axis} }}\n\
+         [[solid]]\nkind = 'revolve'\nprofile = 'ring'\naxis = {{ direction = {axis} }}\n\
+         [[solid]]\nkind = 'revolve'\nprofile = 'hole'\noperation = 'subtract'\n\
+         axis = {{ origin = [20, 20, 38], direction = [1, 0, 0] }}\n"
+    )
+}
+
+/// Shares of voxels change by no more than what lies between two surfaces that nearly meet: where rows across them both
+/// are told apart by nothing but rounding, nothing else may be lost, and no work without end be done.
+#[test]
+fn bores_that_nearly_fit_are_those_that_fit() {
+    let mut failed = Vec::new();
+    for axis in ["[0, 0, 1]", "[2, 1, 2]"] {
+        let grid_of = |scene: &voxlathe::Scene| {
+            let b = scene.bounds();
+            let spacing = DVec3::splat((b.max - b.min).max_element() / 8.0);
+            GridSpec::new([9; 3], b.min - spacing * 0.21, spacing).expect("a grid")
+        };
+        let shares = |gap: f64, seat: f64, grid: Option<&GridSpec>| {
+            let scene = voxlathe::Scene::parse(&nearly_fitting(axis, gap, seat)).expect("a scene");
+            let grid = grid.cloned().unwrap_or_else(|| grid_of(&scene));
+            let found = sample::fraction(&scene, &grid).expect("fractions");
+            (grid, found)
+        };
+        let (grid, fitting) = shares(0.0, 44.0, None);
+        for digits in [4, 7, 8, 9, 10, 11, 12, 14] {
+            let gap = 10.0_f64.powi(-digits);
+            for (gap, seat) in [
+                (gap, 44.0),
+                (-gap, 44.0),
+                (0.0, 44.0 + gap),
+                (gap, 44.0 - gap),
+            ] {
+                let (_, found) = shares(gap, seat, Some(&grid));
+                // A surface in a voxel is less than thrice a side of it.
+                let most = 6.0 * gap.abs().max((seat - 44.0).abs()) / grid.spacing().x + 1.2e-7;
+                let off = |n: &usize| f64::from((fitting.data()[*n] - found.data()[*n]).abs());
+                let worst = (0..found.data().len())
+                    .max_by(|a, b| off(a).total_cmp(&off(b)))
+                    .expect("voxels");
+                if off(&worst) > most {
+                    failed.push(format!(
+                        "about {axis}, gap {gap:e}, seat {seat}: voxel {worst} has {}, {} where it fits",
+                        found.data()[worst],
+                        fitting.data()[worst]
+                    ));
+                }
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}

@@ -218,7 +218,7 @@ impl FractionSampler {
                     }
                     several => {
                         let chords = Crossed::new(bodies, several, centre, self.sides);
-                        let share = if let Some(chords) = chords {
+                        let share = if let Some(mut chords) = chords {
                             tally.ways.crossed += 1;
                             chords.share(self.estimated)
                         } else {

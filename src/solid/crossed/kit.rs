@@ -150,7 +150,7 @@ impl Crossed<'_> {
             let [low, high] = cell.sides[c];
             (cell.normal[c] + faces[c] * (high - low)).abs() / faces[c]
         });
-        cell.error = closure.fold(cell.error, f64::max) + 2.0 * self.rounding;
+        cell.error = closure.fold(cell.error, f64::max) + 2.0 * self.rounding + self.united;
         cell
     }
 }

@@ -17,12 +17,14 @@
 //! * where a circle about an axis, or a sphere, begins or ends in c;
 //! * where an edge of two surfaces turns back in c, between planes that meet other edges.
 //!
-//! Faces that several bodies share need no care: an interval between them has no length.
+//! Faces that several bodies share need no care: an interval between them has no length. Those that are shared but for
+//! rounding, or for digits that were left out, are made one ([`kin`]).
 //!
 //! * Error: the distance of two answers, of rows along different directions, beside that of nested rules on the integrals
 //!   between cuts, which are analytic there; square roots at cuts are
 //!   smoothed by a substitution. Where rows run out before the estimates are small the error says so.
 
+mod kin;
 mod kit;
 mod panels;
 mod places;
@@ -50,10 +52,14 @@ const MOST: usize = 64;
 const BRANCHES: u32 = 64;
 /// Label of the voxel's sides, as ends of intervals.
 const SIDE: [u32; 2] = [0, 1];
+/// Slope up to which a straight piece that is not horizontal is crossed as bent ones are.
+const FLAT: f64 = 1e-2;
 /// Places along a row nearer than this, in voxels, count as one.
 const TINY: f64 = 1e-12;
-/// Rows after which an estimate is taken as it is: some hundredths of a second's work.
+/// Rows after which an estimate is taken as it is, and nothing is cut any more: a tenth of a second's work.
 const MOST_ROWS: u64 = 1 << 18;
+/// Rows after which nothing more is looked at.
+const LAST_ROWS: u64 = 2 * MOST_ROWS;
 
 /// What is inside of one solid that a body is made of: a row that no surface of it crosses is wholly in it or not.
 enum Whole<'a> {
@@ -111,6 +117,8 @@ pub(crate) struct Crossed<'a> {
     tiny: f64,
     /// What places are rounded to.
     rounding: f64,
+    /// Share of the voxel that may lie between surfaces that were made one.
+    united: f64,
     rows: Cell<u64>,
 }
 
@@ -180,6 +188,7 @@ impl<'a> Crossed<'a> {
             cell: sides,
             tiny: TINY,
             rounding: 16.0 * f64::EPSILON,
+            united: 0.0,
             rows: Cell::new(0),
         };
         let mut labels = BRANCHES;
@@ -209,6 +218,7 @@ impl<'a> Crossed<'a> {
             made.rounding = made.rounding.max(16.0 * f64::EPSILON * far / least);
             made.tiny = made.tiny.max(64.0 * f64::EPSILON * far / least);
         }
+        made.united += kin::unite(&mut made.parts, kin::LITTLE);
         Some(made)
     }
 
@@ -331,7 +341,18 @@ impl<'a> Crossed<'a> {
             let inside_below = piece.disc_sign() > 0;
             // The solid lies left of the way.
             let inside_above = piece.forward == (r1 > r0);
-            let bent = piece.piece.degree() > 1;
+            let (dr, dz) = (r1 - r0, z1 - z0);
+            let straight = piece.piece.degree() == 1;
+            // The two sheets of a cone's quadric are too near to each other to be told apart where it is nearly a plane.
+            let flat = straight && dz.abs() <= FLAT * dr.abs();
+            let plane = if piece.piece.is_horizontal() {
+                Some(0.0)
+            } else if flat {
+                kin::between_plane(dz, &z)
+            } else {
+                None
+            };
+            let bent = !straight || flat && plane.is_none();
             for rim in ends {
                 match part.rims.iter_mut().find(|r| r.0 == rim) {
                     Some(known) => known.1 |= bent,
@@ -339,15 +360,15 @@ impl<'a> Crossed<'a> {
                 }
             }
             let circle = piece.piece.circle();
-            if piece.piece.is_horizontal() {
+            if let Some(between) = plane {
+                self.united += between;
                 let sheet = Sheet::Plane {
-                    form: z.scaled(1.0, -z0),
+                    form: z.scaled(1.0, -0.5 * (z0 + z1)),
                     radii: Some([r0.min(r1), r0.max(r1)]),
                 };
                 part.surfaces
                     .push(surface(sheet, !inside_above, solid, labels));
-            } else if piece.piece.degree() == 1 {
-                let (dr, dz) = (r1 - r0, z1 - z0);
+            } else if !bent {
                 let square = dr * dr + dz * dz;
                 let radius = z.scaled(dr, r0 * dz - dr * z0);
                 let share = dz * dz / square;
@@ -572,16 +593,32 @@ impl<'a> Crossed<'a> {
         })
     }
 
-    /// Sorts by place; what is at one place by label.
+    /// Sorts by place; what is at one place by label, without what enters and leaves one solid there.
     fn sort(&self, events: &mut SmallVec<[Event; 24]>) {
         events.sort_unstable_by(|a, b| a.place.total_cmp(&b.place));
-        let mut start = 0;
+        let (mut start, mut kept) = (0, 0);
         for i in 1..=events.len() {
-            if i == events.len() || events[i].place - events[i - 1].place > self.tiny {
-                events[start..i].sort_unstable_by_key(|e| e.label);
-                start = i;
+            if i < events.len() && events[i].place - events[i - 1].place <= self.tiny {
+                continue;
             }
+            if i - start > 1 {
+                events[start..i].sort_unstable_by_key(|e| e.label);
+            }
+            let first = kept;
+            for k in start..i {
+                let event = events[k];
+                let undone = |e: &Event| e.solid == event.solid && e.inside != event.inside;
+                if let Some(other) = events[first..kept].iter().rposition(undone) {
+                    events.copy_within(first + other + 1..kept, first + other);
+                    kept -= 1;
+                } else {
+                    events[kept] = event;
+                    kept += 1;
+                }
+            }
+            start = i;
         }
+        events.truncate(kept);
     }
 
     /// Where one body's part in the rows of a family may change, without the ends.
@@ -674,7 +711,35 @@ impl<'a> Crossed<'a> {
     }
 
     /// The share of the voxel in the terms, with an estimate of its error that should be some `tolerance`, up to four.
-    pub(crate) fn share(&self, tolerance: f64) -> Integral {
+    pub(crate) fn share(&mut self, tolerance: f64) -> Integral {
+        let mut best = self.agreed(tolerance);
+        if best.error > 4.0 * tolerance {
+            // What is not found between surfaces that nearly coincide may be little enough to be left out.
+            let more = kin::unite(&mut self.parts, kin::AT_MOST);
+            if more > 0.0 && more < best.error {
+                self.united += more;
+                let other = self.agreed(tolerance);
+                if other.error + more < best.error {
+                    best = other;
+                } else {
+                    self.united -= more;
+                }
+            }
+        }
+        // What faces that coincide leave between them is rounding: where the solid's surface is far nothing is.
+        let value = match best.value {
+            v if v <= self.rounding => 0.0,
+            v if v >= 1.0 - self.rounding => 1.0,
+            v => v,
+        };
+        Integral {
+            value,
+            error: best.error + 2.0 * self.rounding + self.united,
+        }
+    }
+
+    /// A share that two orders of the directions agree about.
+    fn agreed(&self, tolerance: f64) -> Integral {
         let [along, moving, planes] = self.directions();
         let orders = [
             [along, moving, planes],
@@ -702,16 +767,7 @@ impl<'a> Crossed<'a> {
                 break;
             }
         }
-        // What faces that coincide leave between them is rounding: where the solid's surface is far nothing is.
-        let value = match best.value {
-            v if v <= self.rounding => 0.0,
-            v if v >= 1.0 - self.rounding => 1.0,
-            v => v,
-        };
-        Integral {
-            value,
-            error: best.error + 2.0 * self.rounding,
-        }
+        best
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::places::{Family, Places};
 use super::sheet::{Line, zero};
-use super::{BRANCHES, Crossed, MOST_ROWS, Row, SIDE, Sums};
+use super::{BRANCHES, Crossed, LAST_ROWS, MOST_ROWS, Row, SIDE, Sums};
 use crate::math::quadrature::{FIFTEEN, Integral, Nested, SEVEN, graded, points};
 use smallvec::SmallVec;
 
@@ -124,6 +124,10 @@ impl Crossed<'_> {
     fn is_spent(&self) -> bool {
         self.rows.get() > MOST_ROWS
     }
+
+    fn is_over(&self) -> bool {
+        self.rows.get() > LAST_ROWS
+    }
 }
 
 /// Sums over rows, with an estimate of the error of each.
@@ -165,6 +169,12 @@ impl<const N: usize> Sum<N> {
         self.errors.iter_mut().for_each(|e| *e += error);
     }
 
+    /// With a part that nothing is known of but that a sum over it is between 0 and its width.
+    fn unknown(&mut self, width: f64) {
+        self.values.iter_mut().for_each(|v| *v += 0.5 * width);
+        self.doubt(width);
+    }
+
     fn error(&self) -> f64 {
         self.errors.iter().fold(0.0, |most, e| most.max(*e))
     }
@@ -204,6 +214,10 @@ pub(super) fn integrals<S: Sums<N>, const N: usize>(
     while let Some(stretch) = work.pop() {
         if stretch.width() <= NARROW {
             total.doubt(stretch.width());
+            continue;
+        }
+        if voxel.is_over() {
+            total.unknown(stretch.width());
             continue;
         }
         match of_planes(voxel, stretch, STRETCH * tolerance, &slice) {
@@ -370,6 +384,10 @@ fn area<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, tolerance: 
     while let Some(stretch) = work.pop() {
         if stretch.width() <= NARROW {
             found.sum.doubt(stretch.width());
+            continue;
+        }
+        if voxel.is_over() {
+            found.sum.unknown(stretch.width());
             continue;
         }
         match of_rows::<S, N>(voxel, family, stretch, STRETCH * tolerance) {
@@ -700,7 +718,7 @@ fn changes<S: Sums<N>, const N: usize>(voxel: &Crossed, family: Family, out: &mu
     }
     let mut work: Vec<Stretch> = alone.into_vec();
     while let Some(stretch) = work.pop() {
-        if stretch.width() <= NARROW || stretch.depth >= DEPTH {
+        if stretch.width() <= NARROW || stretch.depth >= DEPTH || voxel.is_spent() {
             continue;
         }
         let us = points(&SEVEN);

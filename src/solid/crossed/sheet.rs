@@ -109,7 +109,7 @@ impl Quadric {
     }
 
     /// Half its gradient.
-    fn slope(&self, p: [f64; 3]) -> DVec3 {
+    pub(super) fn slope(&self, p: [f64; 3]) -> DVec3 {
         let row = |i: usize| (0..3).map(|j| self.squares[i][j] * p[j]).sum::<f64>();
         DVec3::new(row(0), row(1), row(2)) + DVec3::from_array(self.linear)
     }
