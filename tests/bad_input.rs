@@ -1,5 +1,10 @@
 //! Broken, hostile and absurd input: refused with its place, or answered; never a panic or a hang.
 
+#![allow(
+    clippy::print_stdout,
+    reason = "the figures are what the slow test is for"
+)]
+
 #[path = "support/command.rs"]
 mod support;
 
@@ -826,6 +831,32 @@ fn huge_and_tiny_coordinates_are_answered() {
     built("a small scale", turn("place = [{ scale = 1e-50 }]"));
 }
 
+/// Ends of pieces that are apart by a hair, and count as one, leave the layer between them a height of less than nothing.
+#[test]
+fn ends_that_are_apart_by_a_hair_leave_shares_between_nothing_and_all() {
+    let (race, hair) = (3.060_820_804_947_590_5, 3.16e-12);
+    for (below, above) in [(hair, 0.0), (-hair, 0.0), (0.0, hair), (0.0, -hair)] {
+        let curves = format!(
+            "{{ kind = 'polyline', points = [[19.4, {:?}], [19.4, -6.6], [23.5, -6.6], [23.5, 6.6], [19.4, 6.6], [19.4, {:?}]] }}, \
+             {{ kind = 'arc', center = [16.524, 0], radius = 4.2, from = 46.783114815247515, to = -46.783114815247515 }}",
+            below - race,
+            race + above
+        );
+        let text = format!(
+            "schema = 1\n[grid]\nresolution = 7\n[profiles.p]\ncurves = [{curves}]\n\
+             [[solid]]\nkind = 'revolve'\nprofile = 'p'\n"
+        );
+        built(
+            &format!("ends apart by {below:e} and {above:e}"),
+            text.clone(),
+        );
+        let scene = Scene::parse(&text).expect("a scene");
+        let grid = scene.grid().expect("a grid");
+        let found = sample::fraction(&scene, &grid).expect("fractions");
+        assert!(found.data().iter().all(|f| (0.0..=1.0).contains(f)));
+    }
+}
+
 /// Where neighbouring f64 are further apart than the solid is wide, its bounds still hold it, and a
 /// grid is answered or refused for that.
 #[test]
@@ -916,13 +947,15 @@ fn numbers_of(name: &str) -> (String, Vec<std::ops::Range<usize>>) {
     (text, numbers)
 }
 
-/// Every number of every shipped scene, one at a time. `VOXLATHE_SCENES` names those to take, by what their names begin with.
+/// Every number of every shipped scene, one at a time. `VOXLATHE_SCENES` are those to take, with commas between.
 #[test]
 #[ignore = "minutes: every number of every scene"]
 fn every_number_is_moved_by_much_and_by_little() {
     let only = std::env::var("VOXLATHE_SCENES").unwrap_or_default();
     let (mut count, mut slowest) = (0, (0.0, String::new()));
-    for name in shipped_names().iter().filter(|n| n.starts_with(&only)) {
+    let only: Vec<&str> = only.split(',').filter(|n| !n.is_empty()).collect();
+    let wanted = |n: &&String| only.is_empty() || only.contains(&n.as_str());
+    for name in shipped_names().iter().filter(wanted) {
         let (text, numbers) = numbers_of(name);
         for range in numbers {
             let value: f64 = text[range.clone()].parse().expect("a number");

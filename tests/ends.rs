@@ -124,7 +124,8 @@ fn writers(place: &Path) -> Vec<Vec<String>> {
     let (mesh, page) = (at("m.ply"), at("page.html"));
     let (picture, volume) = (at("p.png"), at("v.g2"));
     let (mixed, single, tree) = (at("mixed"), at("one.vti"), at("one.zarr"));
-    let lists: [&[&str]; 12] = [
+    let shown = at("shown.html");
+    let lists: [&[&str]; 13] = [
         &["voxelize", &torus, "-o", &stack, "--resolution", "24"],
         &[
             "voxelize",
@@ -166,6 +167,15 @@ fn writers(place: &Path) -> Vec<Vec<String>> {
             "zstd",
             "--force",
         ],
+        &[
+            "view",
+            &torus,
+            "-o",
+            &shown,
+            "--resolution",
+            "16",
+            "--force",
+        ],
         &["query", &torus, "--points", &points, "-o", &table],
         &["mesh", &torus, "-o", &mesh],
         &[
@@ -196,6 +206,9 @@ fn is_complete(arguments: &[String]) -> bool {
 fn is_whole(out: &str) -> bool {
     if out.ends_with(".vti") {
         return fs::read(out).is_ok_and(|bytes| bytes.ends_with(b"</VTKFile>\n"));
+    }
+    if out.ends_with(".html") {
+        return fs::read(out).is_ok_and(|bytes| bytes.ends_with(b"</html>\n"));
     }
     if out.ends_with(".zarr") {
         let arrays = ["fraction", "occupancy", "sdf", "x", "y", "z", "zarr.json"];
@@ -286,8 +299,8 @@ fn long_runs(place: &Path) -> Vec<Vec<String>> {
     let (tori, goblet) = (at("tori.toml"), shipped("goblet"));
     let (stack, mesh, picture) = (at("s/stack"), at("m.ply"), at("p.png"));
     let (many, table, page) = (at("many.npy"), at("t.npy"), at("page.html"));
-    let (study, cut) = (at("study"), "z=0.1");
-    let lists: [&[&str]; 9] = [
+    let (study, shown, cut) = (at("study"), at("shown.html"), "z=0.1");
+    let lists: [&[&str]; 11] = [
         &["voxelize", &goblet, "-o", &stack, "--resolution", "1500"],
         &[
             "voxelize",
@@ -299,6 +312,8 @@ fn long_runs(place: &Path) -> Vec<Vec<String>> {
             "--channels",
             "fraction",
         ],
+        &["view", &goblet, "-o", &shown, "--resolution", "512"],
+        &["view", &tori, "-o", &shown, "--resolution", "100"],
         &["measure", &tori],
         &["mesh", &goblet, "-o", &mesh, "--chord-error", "5e-5"],
         &["validate", &goblet, "--resolution", "700", "-o", &page],

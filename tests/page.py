@@ -314,6 +314,18 @@ class Checks:
         self.check(f"{name}: silhouette {found}", furthest <= MOST_OFF and found["count"] > 500)
         return furthest, seen
 
+    def digests(self, name, told, stack):
+        """The digests of the page's facts against those of a stack's files."""
+        with open(os.path.join(stack, "manifest.json"), encoding="utf-8") as file:
+            files = {f["name"]: f["blake3"] for f in json.load(file)["files"]}
+        wanted = {c: files[f"{c}.raw"] for c in told["channels"]}
+        found = self.browser.run(
+            "Object.fromEntries([...document.querySelectorAll('.facts')]"
+            ".filter((f) => f.querySelector('h3').textContent === 'Values, BLAKE3')"
+            ".flatMap((f) => [...f.querySelectorAll('dt')].map((t) => [t.textContent, t.nextElementSibling.textContent])))"
+        )
+        self.check(f"{name}: digests {found}, of the stack {wanted}", found == wanted)
+
     def values(self, name, stack, told, seen):
         """What is under the pointer at some places against the samples of a stack, and where it should be.
 
@@ -409,11 +421,11 @@ class Checks:
         times = browser.run("window.voxlathe.times")
         drawn = browser.run("window.voxlathe.drawn")
         self.check(f"{name}: drawn by {drawn}", drawn == "webgl")
-        # The picture that the page carries is `render`'s; once the command itself is asked.
-        if name == "goblet":
-            self.silhouette(f"{name} by the command", path)
+        furthest = self.silhouette(f"{name} by the command", path)[0]
+        self.digests(name, told, stack)
+        # Where the solid is in the picture that the page carries, which is as large as the view.
         against = browser.run(AS_LARGE_AS_STILL)
-        furthest, seen = self.silhouette(name, None, against=against)
+        _, seen = self.silhouette(name, None, against=against)
         self.values(name, stack, told, seen)
         self.quiet(name)
         shutil.rmtree(stack, ignore_errors=True)
@@ -439,6 +451,52 @@ class Checks:
             f" all {times['ready'] / 1000:.2f} s, {frames:.1f} frames a second at 512 x 512 without a graphics processor"
         )
         return page
+
+    def thin_walls(self, scenes):
+        """Walls that are thinner than a voxel have the colour of their own material, not of what is behind them."""
+        page, _ = self.view("tank", os.path.join(scenes, "two_material_tank.toml"), "--resolution", 24)
+        browser = self.browser
+        browser.size(780, 700)
+        browser.open(page)
+        self.quiet("tank")
+        red = browser.run(
+            "(() => { const from = document.getElementById('solid'), c = document.createElement('canvas'); [c.width, c.height] = [from.width, from.height];"
+            " const g = c.getContext('2d'); g.drawImage(from, 0, 0); const half = Math.floor(c.height / 2), n = [0, 0];"
+            " g.getImageData(0, 0, c.width, c.height).data.forEach((_, i, d) => { if (i % 4 === 0 && d[i + 3] > 0 && d[i] > d[i + 2] + 40) n[i / 4 / c.width < half ? 0 : 1]++; });"
+            " return n; })()"
+        )
+        self.check(f"tank: {red} pixels of water in the upper half and the lower", red[0] > 500 and red[1] == 0)
+
+    def large(self, scenes):
+        """A grid with more voxels along a side than are shown."""
+        browser = self.browser
+        goblet, stack = os.path.join(scenes, "goblet.toml"), os.path.join(self.folder, "large")
+        arguments = ("--resolution", 600, "--channels", "occupancy,sdf")
+        page, told = self.view("large", goblet, *arguments)
+        self.command("voxelize", goblet, "-o", stack, "--formats", "raw", "--force", *arguments)
+        self.check(f"large: one voxel of {told['stride']}, {told['shown']}", told["stride"] == 2 and max(told["shown"]) <= 512)
+        browser.size(780, 700)
+        browser.open(page)
+        self.quiet("large")
+        self.check("large: said", "reduced to" in browser.run("document.getElementById('notices').textContent"))
+        (nx, ny, nz), choice = told["dims"], random.Random("large")
+        right = 0
+        with open(os.path.join(stack, "sdf.raw"), "rb") as sdf, open(os.path.join(stack, "occupancy.raw"), "rb") as occupancy:
+            for _ in range(PLACES):
+                place = [told["stride"] * choice.randrange(n) for n in told["shown"]]
+                found = browser.run("voxlathe.voxel(" + ", ".join(map(str, place)) + ")")
+                i, j, k = found["index"]
+                at = (k * ny + j) * nx + i
+                sdf.seek(4 * at)
+                occupancy.seek(at)
+                same = found["values"] == {"occupancy": occupancy.read(1)[0], "sdf": struct.unpack("<f", sdf.read(4))[0]}
+                for a, n in enumerate((i, j, k)):
+                    same = same and n % 2 == 0 and found["position"][a] == told["origin"][a] + (n + 0.5) * told["spacing"][a]
+                right += same
+        self.check(f"large: {right} of {PLACES} values", right == PLACES)
+        furthest, _ = self.silhouette("large", goblet)
+        shutil.rmtree(stack, ignore_errors=True)
+        print(f"goblet at 600: {told['shown']} of {told['dims']} shown, {told['bytes'] / 1e6:.2f} MB, silhouette {furthest:.1f} pixels")
 
     def fallbacks(self, page, scenes):
         """What a browser may lack."""
@@ -627,6 +685,8 @@ def main(program, *scenes):
                 for path, one in zip(every, made):
                     checks.scene(path, one.result())
             page = checks.goblet(folder)
+            checks.thin_walls(folder)
+            checks.large(folder)
             checks.fallbacks(page, folder)
             for width, height, touch in ((1440, 900, False), (820, 1100, True), (390, 844, True)):
                 checks.layout("goblet", page, width, height, touch)

@@ -5,9 +5,11 @@
 //! ```
 
 use super::codec::{self, Kind};
+use super::digest::Ordered;
 use super::lattice::Lattice;
 use super::source::{ChannelHead, Layers};
 use crate::error::Error;
+use crate::grid::Channel;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -29,6 +31,9 @@ pub(super) struct Stored {
     pub(super) range: Option<[f64; 2]>,
     /// Beyond this size samples are rounded; `None`: every one is as it was sampled.
     pub(super) exact_within: Option<f64>,
+    /// BLAKE3 digest of its samples, before any was rounded, as `--formats raw` writes them; `None` where not all of them
+    /// are shown.
+    pub(super) digest: Option<String>,
 }
 
 impl Stored {
@@ -69,6 +74,20 @@ pub(super) fn slab_layers(lattice: &Lattice) -> usize {
     (SLAB / (lattice.dims[0] * lattice.dims[1])).clamp(1, MOST_LAYERS)
 }
 
+/// Whether all samples of a channel are in a page.
+fn is_all(lattice: &Lattice, head: &ChannelHead) -> bool {
+    lattice.is_whole() && (Channel::from_name(&head.name)).is_none_or(|c| c.staggered().is_none())
+}
+
+/// Samples as `--formats raw` writes them.
+fn raw(head: &ChannelHead, layers: &[Vec<u32>]) -> Vec<u8> {
+    let samples = layers.iter().flatten();
+    if Channel::from_name(&head.name) == Some(Channel::Occupancy) {
+        return samples.map(|s| s.to_le_bytes()[0]).collect();
+    }
+    samples.flat_map(|s| s.to_le_bytes()).collect()
+}
+
 /// What one slab gave, by channel.
 type Slab = Vec<(Vec<u8>, [f64; 2])>;
 
@@ -87,6 +106,7 @@ pub(super) fn store<L: Layers>(
     let layers = slab_layers(lattice);
     let count = lattice.dims[2].div_ceil(layers);
     let size = [lattice.dims[0], lattice.dims[1]];
+    let digests: Vec<Mutex<Ordered>> = heads.iter().map(|_| Mutex::default()).collect();
     let one = |slab: usize, scratch: &mut L::Scratch| -> Result<Slab, Error> {
         let range = slab * layers..lattice.dims[2].min((slab + 1) * layers);
         let mut samples: Vec<Vec<Vec<u32>>> = vec![Vec::new(); heads.len()];
@@ -96,8 +116,17 @@ pub(super) fn store<L: Layers>(
                 return Err(Error::Interrupted);
             }
             for (all, found) in samples.iter_mut().zip(layer) {
-                let shown = lattice.of_layer(&found);
-                all.push(shown.into_iter().map(|bits| keep.bits(bits)).collect());
+                all.push(lattice.of_layer(&found));
+            }
+        }
+        for ((head, layers), digest) in heads.iter().zip(&mut samples).zip(&digests) {
+            if is_all(lattice, head) {
+                let bytes = raw(head, layers);
+                let mut digest = digest.lock().unwrap_or_else(PoisonError::into_inner);
+                digest.add(slab, bytes);
+            }
+            for bits in layers.iter_mut().flatten() {
+                *bits = keep.bits(*bits);
             }
         }
         let encoded = heads.iter().zip(&samples).map(|(head, layers)| {
@@ -109,8 +138,13 @@ pub(super) fn store<L: Layers>(
         Ok(encoded.collect())
     };
     let slabs = in_order(count, workers, one)?;
-    let mut stored: Vec<Stored> = (heads.iter())
-        .map(|head| Stored {
+    let digest = |head: &ChannelHead, found: &Mutex<Ordered>| {
+        let found = found.lock().unwrap_or_else(PoisonError::into_inner);
+        is_all(lattice, head).then(|| found.finish())
+    };
+    let mut stored: Vec<Stored> = (heads.iter().zip(&digests))
+        .map(|(head, found)| Stored {
+            digest: digest(head, found),
             head: head.clone(),
             slabs: Vec::with_capacity(count),
             layers,

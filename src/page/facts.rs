@@ -1,5 +1,6 @@
 //! What a page says beside the picture: exact numbers, with their units.
 
+use super::channels::Stored;
 use super::lattice::Lattice;
 use crate::grid::GridSpec;
 use crate::io::manifest::Manifest;
@@ -98,7 +99,12 @@ pub(super) struct Counted {
 }
 
 /// The facts of a scene.
-pub(super) fn of_scene(scene: &Scene, lattice: &Lattice, counted: Option<Counted>) -> Vec<Group> {
+pub(super) fn of_scene(
+    scene: &Scene,
+    lattice: &Lattice,
+    counted: Option<Counted>,
+    channels: &[Stored],
+) -> Vec<Group> {
     let units = scene.model().units.name();
     let (square, cube) = (power(units, 2), power(units, 3));
     let known = |i: Integral| (i.value, Some(i.error));
@@ -145,12 +151,27 @@ pub(super) fn of_scene(scene: &Scene, lattice: &Lattice, counted: Option<Counted
             rows: solid,
         },
         sampled,
+        values(channels),
         source,
     ]
 }
 
+/// The digests of the channels that are shown whole, by which others tell that they have the same.
+fn values(channels: &[Stored]) -> Group {
+    let known = |c: &Stored| Some(row(&c.head.name, c.digest.as_deref()?));
+    Group {
+        title: "Values, BLAKE3",
+        rows: channels.iter().filter_map(known).collect(),
+    }
+}
+
 /// The facts of a stack, as its manifest has them.
-pub(super) fn of_stack(manifest: &Manifest, digest: &str, lattice: &Lattice) -> Vec<Group> {
+pub(super) fn of_stack(
+    manifest: &Manifest,
+    digest: &str,
+    lattice: &Lattice,
+    channels: &[Stored],
+) -> Vec<Group> {
     let units = manifest.units.as_str();
     let cube = power(units, 3);
     let volume = manifest
@@ -198,6 +219,7 @@ pub(super) fn of_stack(manifest: &Manifest, digest: &str, lattice: &Lattice) -> 
             rows: solid,
         },
         sampled,
+        values(channels),
         Group {
             title: "Source",
             rows: source,

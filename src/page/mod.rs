@@ -16,6 +16,7 @@
 
 mod channels;
 mod codec;
+mod digest;
 mod facts;
 mod lattice;
 mod sheet;
@@ -241,6 +242,7 @@ pub fn of_scene(
     if surface.is_none() {
         notices.push("nothing is left of the solids: there is no surface to draw".into());
     }
+    let facts = facts::of_scene(scene, &lattice, counted, &stored);
     let view = seen(scene, View::default(), cancel)?;
     let ids = materials_of(scene);
     let name = |id: &u32| scene.model().materials.get(id).cloned();
@@ -256,7 +258,7 @@ pub fn of_scene(
             .collect(),
         middle: view.middle.to_array(),
         extent: view.extent,
-        facts: facts::of_scene(scene, &lattice, counted),
+        facts,
         notices,
         still: Some(still),
     };
@@ -324,6 +326,7 @@ pub fn of_stack(
     let (middle, extent) = framed(surface.as_ref(), &grid);
     let bytes = std::fs::read(directory.join(MANIFEST_NAME)).unwrap_or_default();
     let digest = blake3::hash(&bytes).to_hex().to_string();
+    let facts = facts::of_stack(manifest, &digest, &lattice, &stored);
     let name = |id: u32| {
         let named = manifest.materials.get(id.to_string());
         named.and_then(|n| n.as_str()).map(str::to_owned)
@@ -347,7 +350,7 @@ pub fn of_stack(
             .collect(),
         middle,
         extent,
-        facts: facts::of_stack(manifest, &digest, &lattice),
+        facts,
         notices,
         still: None,
     })
@@ -411,7 +414,7 @@ fn drawn(scene: &Scene, options: &PageOptions, cancel: Cancel<'_>) -> Result<Sur
 
 /// Bytes that are left for channels, before they are written as text.
 fn room(surface: Option<&Surface>, still: usize) -> usize {
-    let drawn: usize = surface.map_or(0, |s| s.slabs.iter().map(Vec::len).sum());
+    let drawn: usize = surface.map_or(0, |s| s.slabs.iter().chain(&s.skin).map(Vec::len).sum());
     let left = (MOST_BYTES - TEXT) / 4 * 3;
     left.saturating_sub(drawn).saturating_sub(still)
 }

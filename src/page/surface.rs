@@ -22,6 +22,9 @@
 //!             p          p = q - n / 2         w = 1/2 - u(p)      the wall's thickness, where it is less than 1
 //!   -----------------
 //! ```
+//!
+//! Where there are several materials the field comes with another of them, sampled a little below the surface next to each
+//! voxel, so that a wall which is thinner than a voxel has its own colour.
 
 use super::channels::{in_order, slab_layers};
 use super::codec::{self, Kind};
@@ -31,7 +34,7 @@ use crate::error::Error;
 use crate::grid::GridSpec;
 use crate::math::Aabb;
 use crate::picture::View;
-use crate::solid::Assembly;
+use crate::solid::{Assembly, Part};
 use glam::DVec3;
 
 /// Voxels along the longest side of a scene's field, the room around it included: the least that WebGL 2 promises.
@@ -62,6 +65,8 @@ pub(super) struct Surface {
     pub(super) made: Made,
     /// The length that numbers are in.
     pub(super) unit: f64,
+    /// Materials next to the surface in slabs like those of the field, 0 where the surface is far; where there are several.
+    pub(super) skin: Vec<Vec<u8>>,
     /// Box of what is inside, as it is seen by the default view, in scene units along the picture's right and up.
     pub(super) seen: Option<[[f64; 2]; 2]>,
 }
@@ -135,6 +140,11 @@ pub(super) fn store<L: Layers>(
             Made::Share => 0.5 - stored,
         }
     };
+    let has_skin = solid.is_some_and(|s| {
+        let mut materials = s.added().map(Part::material);
+        let first = materials.next();
+        materials.any(|m| Some(m) != first)
+    });
     // Layers beside a slab that its walls are looked for in.
     let beside = if solid.is_some() { REACH } else { 0 };
     let one = |slab: usize, scratch: &mut L::Scratch| -> Result<_, Error> {
@@ -151,6 +161,7 @@ pub(super) fn store<L: Layers>(
         }
         let mut seen = Seen::default();
         let mut numbers = Vec::with_capacity(own.len());
+        let mut skins = Vec::new();
         for k in own {
             let walls = Walls {
                 lattice,
@@ -164,17 +175,23 @@ pub(super) fn store<L: Layers>(
             let layer: Vec<u32> = layer.into_iter().map(number).collect();
             seen.add(lattice, k, &layer);
             numbers.push(layer);
+            if let Some(solid) = solid.filter(|_| has_skin) {
+                skins.push(walls.skin(solid, k));
+            }
             if cancel() {
                 return Err(Error::Interrupted);
             }
         }
-        Ok((codec::encode(Kind::Uint, size, &numbers), seen))
+        let skin = has_skin.then(|| codec::encode(Kind::Uint, size, &skins));
+        Ok((codec::encode(Kind::Uint, size, &numbers), skin, seen))
     };
     let found = in_order(lattice.dims[2].div_ceil(layers), workers, one)?;
     let mut seen = Seen::default();
     let mut slabs = Vec::with_capacity(found.len());
-    for (bytes, part) in found {
+    let mut skin = Vec::new();
+    for (bytes, materials, part) in found {
         slabs.push(bytes);
+        skin.extend(materials);
         seen.join(&part);
     }
     Ok(Surface {
@@ -183,12 +200,17 @@ pub(super) fn store<L: Layers>(
         layers,
         made,
         unit,
+        skin,
         seen: seen.known(),
     })
 }
 
 /// Samples from a voxel within which its wall is looked for.
 const REACH: usize = 3;
+/// Spacings from the surface within which materials are looked for.
+const SKIN: f64 = 2.0;
+/// Spacings below the surface at which they are, the first that has one.
+const BELOW: [f64; 4] = [0.02, 0.1, 0.3, 0.6];
 /// How thick walls are made, in spacings: linear interpolation does not miss that.
 const THICK: f64 = 1.15;
 
@@ -224,9 +246,32 @@ impl Walls<'_> {
         layer
     }
 
-    /// Half of what the wall by a voxel lacks of being thick.
-    fn missing(&self, solid: &Assembly, voxel: [usize; 3], u: f64) -> f64 {
-        // Outward: along each axis from the neighbour that is further out, which no thin wall comes between.
+    /// The materials next to the surface in layer `k`.
+    fn skin(&self, solid: &Assembly, k: usize) -> Vec<u32> {
+        let [nx, ny, nz] = self.lattice.dims;
+        let inner = |n: usize| REACH..n.saturating_sub(REACH);
+        let mut layer = vec![0; nx * ny];
+        if !inner(nz).contains(&k) {
+            return layer;
+        }
+        let spacing = self.lattice.grid.spacing();
+        for j in inner(ny) {
+            for i in inner(nx) {
+                let u = self.at([i, j, k]);
+                if u.abs() < SKIN {
+                    let outward = self.outward([i, j, k], u);
+                    let foot = self.lattice.grid.centre(i, j, k) - outward * u * spacing;
+                    let below = BELOW.iter().map(|b| foot - outward * *b * spacing);
+                    let mut found = below.map(|p| solid.material(p));
+                    layer[j * nx + i] = found.find(|m| *m > 0).unwrap_or(0);
+                }
+            }
+        }
+        layer
+    }
+
+    /// Away from the solid: along each axis from the neighbour that is further out, which no thin wall comes between.
+    fn outward(&self, voxel: [usize; 3], u: f64) -> DVec3 {
         let slope = |a: usize| {
             let mut next = voxel;
             next[a] += 1;
@@ -235,7 +280,12 @@ impl Walls<'_> {
             let down = self.at(next) - u;
             if up >= down { up } else { -down }
         };
-        let outward = DVec3::from([0, 1, 2].map(slope)).normalize_or_zero();
+        DVec3::from([0, 1, 2].map(slope)).normalize_or_zero()
+    }
+
+    /// Half of what the wall by a voxel lacks of being thick.
+    fn missing(&self, solid: &Assembly, voxel: [usize; 3], u: f64) -> f64 {
+        let outward = self.outward(voxel, u);
         let below = -outward * (u + 0.5);
         // Where interpolation has it well inside the wall is thick enough.
         if outward == DVec3::ZERO || self.between(voxel, below) <= -0.35 {

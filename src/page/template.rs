@@ -117,6 +117,16 @@ impl Page {
             digits(slabs, out)?;
             out.write_all(b"</script>\n")?;
         }
+        if let Some(skin) = self
+            .surface
+            .as_ref()
+            .map(|s| &s.skin)
+            .filter(|s| !s.is_empty())
+        {
+            out.write_all(b"<script type=\"text/plain\" id=\"skin\">")?;
+            digits(skin, out)?;
+            out.write_all(b"</script>\n")?;
+        }
         write!(
             out,
             "<script nonce=\"{nonce}\">\n\"use strict\";\n(() => {{\n"
@@ -164,7 +174,7 @@ impl Page {
 
     fn facts_html(&self) -> String {
         let mut html = String::new();
-        for group in &self.facts {
+        for group in self.facts.iter().filter(|g| !g.rows.is_empty()) {
             let _ = write!(
                 html,
                 "<section class=\"facts\"><h3>{}</h3><dl>",
@@ -225,6 +235,7 @@ fn surface(s: &Surface) -> Value {
         "distance": s.made == Made::Distance,
         "layers": s.layers,
         "slabs": s.slabs.iter().map(Vec::len).collect::<Vec<_>>(),
+        "skin": s.skin.iter().map(Vec::len).collect::<Vec<_>>(),
     })
 }
 

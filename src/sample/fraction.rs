@@ -212,7 +212,8 @@ impl FractionSampler {
                                 }
                             };
                             tally.loose.count(1, share.error, self.error);
-                            share.value
+                            // Its error may reach beyond either end.
+                            share.value.clamp(0.0, 1.0)
                         };
                         if one.complement { 1.0 - share } else { share }
                     }

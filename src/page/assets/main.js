@@ -81,6 +81,9 @@ function ask() {
   });
 }
 
+// The materials next to the surface, where there are several.
+const skin = surfaceHead && surfaceHead.skin.length ? new Samples({ ...surfaceHead, data: "skin", slabs: surfaceHead.skin, kind: "uint" }, surfaceHead.dims) : null;
+
 // Starts or starts again what draws; where it cannot, the page goes on without.
 function startPainter() {
   try {
@@ -88,6 +91,7 @@ function startPainter() {
     trouble = painter.isReduced ? `drawn from ${painter.drawn.dims.join(" × ")} samples, the most for this browser's textures` : "";
     const material = channelOf("material");
     if (material && material.values) painter.setMaterial(material);
+    if (skin && skin.values) painter.setSkin(skin);
   } catch (error) {
     painter = null;
     trouble = `${still ? "a still picture until it is turned" : "drawn coarsely"}: ${error.message}`;
@@ -188,6 +192,11 @@ async function start() {
   }
   times.first = performance.now();
   setState({}, "fragment");
+  if (skin) {
+    await skin.load(breathe);
+    if (painter && !isLost) painter.setSkin(skin);
+    drawSolid(false);
+  }
   await readChannels();
   isReading = true;
   setState({}, "fragment");

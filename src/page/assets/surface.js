@@ -184,9 +184,10 @@ precision highp usampler3D;
 uniform sampler3D field;
 uniform sampler3D channel;
 uniform usampler3D material;
+uniform usampler3D skin;
 uniform sampler2D table;
 uniform vec3 low, high, keepLow, keepHigh, stepUp;
-uniform vec3 dims, sidesLow, sidesHigh;
+uniform vec3 dims, sidesLow, sidesHigh, skinLow, skinStep;
 uniform vec3 right, up, forward, target, key;
 uniform vec2 size;
 uniform float scale, iso, reach, lowValue, highValue;
@@ -226,8 +227,15 @@ vec3 albedo(vec3 p, vec3 n, bool isCut) {
   return pow(texture(table, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb, vec3(2.2));
 #else
   vec3 found = colours[0];
-#ifdef MATERIAL
   bool isOpen = true;
+#ifdef SKIN
+  for (int m = 0; m < 4 && isOpen && !isCut; m++) {
+    ivec3 at = ivec3((p - 0.5 * float(m) * n * skinStep - skinLow) / skinStep);
+    uint place = texelFetch(skin, clamp(at, ivec3(0), textureSize(skin, 0) - 1), 0).r;
+    if (place > 0u) { found = colours[min(place, 16u) - 1u]; isOpen = false; }
+  }
+#endif
+#ifdef MATERIAL
   for (int m = 0; m < 5 && isOpen; m++) {
     ivec3 count = textureSize(material, 0);
     vec3 spacing = (sidesHigh - sidesLow) / vec3(count);
@@ -399,7 +407,7 @@ class Painter {
     const places = {};
     const place = (name) => (places[name] ??= gl.getUniformLocation(program, name));
     gl.useProgram(program);
-    for (const [name, unit] of [["field", 0], ["material", 1], ["channel", 2], ["table", 3], ["start", 4]]) {
+    for (const [name, unit] of [["field", 0], ["material", 1], ["channel", 2], ["table", 3], ["start", 4], ["skin", 5]]) {
       if (place(name)) gl.uniform1i(place(name), unit);
     }
     return { program, place };
@@ -422,7 +430,8 @@ class Painter {
     this.texture(0, gl.R16F, gl.RED, gl.HALF_FLOAT, this.drawn.dims, texels, gl.LINEAR);
     this.texture(1, gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, [1, 1, 1], new Uint8Array(1), gl.NEAREST);
     this.texture(2, gl.R32F, gl.RED, gl.FLOAT, [1, 1, 1], new Float32Array(1), gl.NEAREST);
-    this.hasMaterial = false;
+    this.texture(5, gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, [1, 1, 1], new Uint8Array(1), gl.NEAREST);
+    this.hasMaterial = this.hasSkin = false;
     this.channel = null;
     this.range = [0, 1];
     this.tables();
@@ -467,12 +476,23 @@ class Painter {
   }
 
   setMaterial(samples) {
+    this.materials(1, samples);
+    this.hasMaterial = true;
+  }
+
+  // The materials next to the surface, on the grid that it is drawn from.
+  setSkin(samples) {
+    this.materials(5, samples);
+    this.hasSkin = true;
+  }
+
+  materials(unit, samples) {
     const gl = this.gl;
     const numbers = new Map(model.materials.map((m, n) => [m.id, n + 1]));
     const [dims, ids] = this.thinned(samples, (n) => new Uint32Array(n));
     const texels = Uint8Array.from(ids, (id) => Math.min(numbers.get(id) || 0, 255));
-    this.texture(1, gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, dims, texels, gl.NEAREST);
-    this.hasMaterial = true;
+    this.texture(unit, gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE, dims, texels, gl.NEAREST);
+    if (unit === 5) this.skinStep = surfaceHead.dims.map((n, a) => (n / dims[a]) * field.spacing[a]);
   }
 
   setChannel(samples) {
@@ -496,7 +516,7 @@ class Painter {
     if (this.scout) this.explore(w, h, settings);
     const words = [isFast && "FAST", !surfaceHead.distance && "SHARE", seeksWalls && "WALLS"];
     if (state.colour === "channel" && this.channel) words.push("CHANNEL");
-    else if (this.hasMaterial) words.push("MATERIAL");
+    else words.push(this.hasSkin && "SKIN", this.hasMaterial && "MATERIAL");
     const main = this.program(...words.filter(Boolean));
     gl.useProgram(main.program);
     this.set(main, settings);
@@ -516,7 +536,7 @@ class Painter {
     return {
       uniform3fv: {
         low: field.low, high: field.high, keepLow: keep.low, keepHigh: keep.high, stepUp: this.drawn.step, dims: this.drawn.dims,
-        sidesLow: unit(grid.origin), sidesHigh: unit(ends), right: c.right, up: c.up, forward: c.forward, target: unit(c.target),
+        sidesLow: unit(grid.origin), sidesHigh: unit(ends), skinLow: unit(surfaceHead.corner), skinStep: this.skinStep, right: c.right, up: c.up, forward: c.forward, target: unit(c.target),
         key: basis(state.azimuth - 48, 50).forward.map((v) => -v), colours,
       },
       uniform2fv: { size: [w, h] },

@@ -191,7 +191,8 @@ impl Builder<'_> {
         } else if (height - 1.0).abs() <= self.table.rounding {
             1.0
         } else {
-            height
+            // Ends of pieces that count as one may be apart by a hair.
+            height.clamp(0.0, 1.0)
         };
         let from = self.table.breaks[self.table.breaks.len() - 1];
         self.push(
