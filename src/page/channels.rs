@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::grid::Channel;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 /// Samples of a slab that a page reads at once, about.
 const SLAB: usize = 1 << 21;
@@ -183,7 +184,13 @@ fn range_of(kind: Kind, layers: &[Vec<u32>]) -> [f64; 2] {
     })
 }
 
-/// What `work` gives of each number below `count`, in their order, made by so many workers.
+/// How long a worker that is too far ahead waits before it looks again.
+const WAIT: Duration = Duration::from_millis(1);
+/// How many pieces for each worker may be done before one that is not.
+pub(super) const AHEAD: usize = 2;
+
+/// What `work` gives of each number below `count`, in their order, made by so many workers; no piece is begun while one
+/// that is [`AHEAD`] of the workers' number before it is not done.
 pub(super) fn in_order<T: Send, S: Default>(
     count: usize,
     workers: usize,
@@ -192,6 +199,9 @@ pub(super) fn in_order<T: Send, S: Default>(
     let next = AtomicUsize::new(0);
     let failed = AtomicBool::new(false);
     let found: Mutex<Vec<Option<T>>> = Mutex::new((0..count).map(|_| None).collect());
+    // Pieces before this one are all done.
+    let done = AtomicUsize::new(0);
+    let ahead = AHEAD * workers.max(1);
     let failure: Mutex<Option<Error>> = Mutex::new(None);
     rayon::scope(|scope| {
         for _ in 0..workers.max(1) {
@@ -202,9 +212,21 @@ pub(super) fn in_order<T: Send, S: Default>(
                     if n >= count {
                         break;
                     }
+                    while n > done.load(Ordering::Relaxed) + ahead {
+                        if failed.load(Ordering::Relaxed) {
+                            return;
+                        }
+                        std::thread::sleep(WAIT);
+                    }
                     match work(n, &mut scratch) {
                         Ok(one) => {
-                            found.lock().unwrap_or_else(PoisonError::into_inner)[n] = Some(one);
+                            let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
+                            found[n] = Some(one);
+                            let mut first = done.load(Ordering::Relaxed);
+                            while found.get(first).is_some_and(Option::is_some) {
+                                first += 1;
+                            }
+                            done.store(first, Ordering::Relaxed);
                         }
                         Err(error) => {
                             failed.store(true, Ordering::Relaxed);
@@ -226,6 +248,31 @@ pub(super) fn in_order<T: Send, S: Default>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_worker_runs_far_ahead_of_a_slow_one() {
+        let begun = AtomicUsize::new(0);
+        let seen = AtomicUsize::new(0);
+        let found = in_order(40, 4, |n, (): &mut ()| {
+            begun.fetch_max(n, Ordering::SeqCst);
+            if n == 3 {
+                std::thread::sleep(Duration::from_millis(40));
+                seen.store(begun.load(Ordering::SeqCst), Ordering::SeqCst);
+            }
+            Ok(n)
+        });
+        assert_eq!(found.expect("all are made"), (0..40).collect::<Vec<_>>());
+        assert!(seen.load(Ordering::SeqCst) <= 3 + 4 * AHEAD);
+        // One that fails lets the others go.
+        let failed = in_order(40, 4, |n, (): &mut ()| {
+            if n == 0 {
+                std::thread::sleep(Duration::from_millis(20));
+                return Err(Error::Interrupted);
+            }
+            Ok(n)
+        });
+        assert!(failed.is_err());
+    }
 
     #[test]
     fn what_is_near_keeps_its_bits_and_the_rest_ten() {

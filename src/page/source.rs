@@ -100,9 +100,11 @@ impl Layers for Sampled<'_> {
     }
 }
 
-/// Bytes that a worker takes for a slab of some layers: its samples, what is made of them, and what is compressed.
+/// Bytes that a worker takes for a slab of some layers: its samples, what is made of them, what is compressed, and the
+/// slabs whose digest waits for one before them.
 pub(super) fn bytes_per_slab(grid: &GridSpec, channels: usize, layers: usize) -> u64 {
     let voxels = (grid.layer_len() as u64).saturating_mul(layers as u64);
     let samples = voxels.saturating_mul(4 * channels as u64);
-    samples.saturating_add(voxels.saturating_mul(4 + 3))
+    let waiting = samples.saturating_mul(1 + super::channels::AHEAD as u64);
+    (samples.saturating_add(waiting)).saturating_add(voxels.saturating_mul(4 + 3))
 }
