@@ -58,8 +58,8 @@ const FLAT: f64 = 1e-2;
 const TINY: f64 = 1e-12;
 /// Rows after which an estimate is taken as it is, and nothing is cut any more: a tenth of a second's work.
 const MOST_ROWS: u64 = 1 << 18;
-/// Rows after which nothing more is looked at.
-const LAST_ROWS: u64 = MOST_ROWS / 4 * 5;
+/// Bodies of a voxel for each of which beyond so many there are fewer rows, as each row asks them all.
+const FEW: u64 = 4;
 
 /// What is inside of one solid that a body is made of: a row that no surface of it crosses is wholly in it or not.
 enum Whole<'a> {
@@ -286,6 +286,16 @@ impl<'a> Crossed<'a> {
         }
         self.parts.push(part);
         Some(())
+    }
+
+    /// Whether nothing is to be cut any more.
+    fn is_spent(&self) -> bool {
+        self.rows.get() > MOST_ROWS * FEW / FEW.max(self.parts.len() as u64)
+    }
+
+    /// Whether nothing more is to be looked at.
+    fn is_over(&self) -> bool {
+        self.rows.get() > MOST_ROWS / 4 * 5 * FEW / FEW.max(self.parts.len() as u64)
     }
 
     fn solid(&mut self, whole: Whole<'a>) -> u16 {
@@ -764,7 +774,7 @@ impl<'a> Crossed<'a> {
                 }
             }
             found.push(one);
-            spent += u32::from(self.rows.get() > MOST_ROWS);
+            spent += u32::from(self.is_spent());
             // Where two directions take too long the third hardly helps.
             if best.error <= 4.0 * tolerance || spent > 1 {
                 break;

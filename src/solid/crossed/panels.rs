@@ -2,7 +2,7 @@
 
 use super::places::{Family, Places};
 use super::sheet::{Line, zero};
-use super::{BRANCHES, Crossed, LAST_ROWS, MOST_ROWS, Row, SIDE, Sums};
+use super::{BRANCHES, Crossed, Row, SIDE, Sums};
 use crate::math::quadrature::{FIFTEEN, Integral, Nested, SEVEN, graded, points};
 use smallvec::SmallVec;
 
@@ -119,14 +119,6 @@ impl Crossed<'_> {
             before = Some(row);
         }
         kept
-    }
-
-    fn is_spent(&self) -> bool {
-        self.rows.get() > MOST_ROWS
-    }
-
-    fn is_over(&self) -> bool {
-        self.rows.get() > LAST_ROWS
     }
 }
 
